@@ -8,11 +8,11 @@ use std::path::Path;
 use cft_ident::config::RobotFile;
 use cft_ident::friction::filter::ExtendedKalmanFilter;
 use cft_ident::friction::passes::spread;
-use cft_ident::friction::problem::{FRICTION, FrictionProblem, NoiseLevels, Record};
+use cft_ident::friction::problem::{FRICTION, FrictionProblem, JointRecord, NoiseLevels};
 use cft_ident::friction::score::score;
 use cft_ident::math::rfactor::RFactor;
 use cft_ident::robot::Robot;
-use cft_ident::robot::cft::{Setup, Structure};
+use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{DMatrix, DVector};
 
@@ -27,7 +27,7 @@ fn problem() -> FrictionProblem {
         .iter()
         .map(|t| 60.0 * (1.3 * t).cos().signum() - 40.0 * (1.3 * t).sin());
     FrictionProblem {
-        records: vec![Record {
+        records: vec![JointRecord {
             r: vec![2e-12; SAMPLES],
             tau: tau.collect(),
             m: (0..SAMPLES - 1)
@@ -146,7 +146,7 @@ fn filter(c: &mut Criterion) {
 }
 
 fn regressor(c: &mut Criterion) {
-    let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+    let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
     let rows: Vec<[f64; 12]> = (0..4096)
         .map(|k| {
             let t = f64::from(k) * 0.01;

@@ -7,7 +7,7 @@ use cft_ident::config::held_out::HeldOut;
 use cft_ident::effect::{self, AugmentedModel};
 use cft_ident::log::Block;
 use cft_ident::motion::FilterSettings;
-use cft_ident::observe::{Alarms, Observer};
+use cft_ident::observe::{AlarmDetector, Observer};
 use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::robot::{JointKind, Robot};
@@ -60,7 +60,7 @@ fn nothing_is_allocated_from_row_to_row() {
         ..HeldOut::default()
     }];
     let mut observer = Observer::new(model, &FilterSettings::default()).unwrap();
-    let mut alarms = Alarms::new(&held, 1.0, 10.0);
+    let mut alarms = AlarmDetector::new(&held, 1.0, 10.0);
     let mut block = Block::default();
     let mut seen = 0;
     let mut feed = |k: u32| {

@@ -3,7 +3,7 @@
 
 use cft_ident::config::vertices_of_mesh;
 use cft_ident::robot::tree::capsule::of_pieces;
-use cft_ident::robot::tree::enclosing::{Ball, enclosing};
+use cft_ident::robot::tree::enclosing::{BoundingBall, enclosing};
 use cft_ident::robot::tree::space::UNTURNED;
 use libfuzzer_sys::fuzz_target;
 
@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     let Ok(vertices) = vertices_of_mesh("stl", bytes) else {
         return;
     };
-    let balls: Vec<Ball> = vertices.iter().map(|x| (*x, 0.0)).collect();
+    let balls: Vec<BoundingBall> = vertices.iter().map(|x| (*x, 0.0)).collect();
     let (ends, radius) = enclosing(&balls, &UNTURNED).expect("a mesh has a vertex");
     let largest = vertices.iter().flatten().fold(1.0, |most: f64, x| most.max(x.abs()));
     for vertex in &vertices {

@@ -10,7 +10,7 @@ use cft_ident::identify::{
     self, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings, LoggedRobot,
     LsqSettings, ReducedLogs, RobotSources, TrackSource, ValidateSettings, check_setup,
 };
-use cft_ident::report::json::Document;
+use cft_ident::report::json::JsonDocument;
 use cft_ident::report::{Report, stages};
 use pyo3::prelude::*;
 
@@ -21,7 +21,7 @@ use crate::work;
 /// Document as JSON, page as HTML, text for a terminal.
 type Shown = (String, String, String);
 
-fn shown(document: &Document, report: &Report) -> Shown {
+fn shown(document: &JsonDocument, report: &Report) -> Shown {
     (document.text(), report.html(), report.text())
 }
 
@@ -113,7 +113,7 @@ pub fn friction(
         found.setup = setup.findings;
         found.warnings.splice(0..0, setup.warnings);
         let model = found.model(&machine, old.as_ref());
-        let document = Document::new("friction", &found.inputs, &found.warnings, &found);
+        let document = JsonDocument::new("friction", &found.inputs, &found.warnings, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::friction::friction(&stages::friction::Friction {
             machine: &machine,
@@ -191,9 +191,9 @@ pub fn lsq(
         found.setup.splice(0..0, setup.findings);
         found.warnings.splice(0..0, setup.warnings);
         let model = found.model(&machine, friction.as_ref().map(|given| &given.file));
-        let document = Document::new("lsq", &found.inputs, &found.warnings, &found);
+        let document = JsonDocument::new("lsq", &found.inputs, &found.warnings, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
-        let report = stages::lsq::lsq(&stages::lsq::Lsq {
+        let report = stages::lsq::lsq(&stages::lsq::LsqReport {
             machine: &machine,
             found: &found,
             file: &model,
@@ -224,9 +224,9 @@ pub fn validate(
         };
         let found = identify::validate(&data, &settings, control, &mut |_, _| {});
         let found = found.map_err(of_stage)?;
-        let document = Document::new("validate", &found.inputs, &found.warnings, &found);
+        let document = JsonDocument::new("validate", &found.inputs, &found.warnings, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
-        let report = stages::validate::validate(&stages::validate::Validate {
+        let report = stages::validate::validate(&stages::validate::ValidateReport {
             machine: &data.machine,
             file: &given.file,
             model: &augmented,
@@ -262,16 +262,16 @@ pub fn diagnose(
         let end = identify::diagnose(&data, &settings, control).map_err(of_stage)?;
         match end {
             DiagnoseEnd::DataFault(fault) => {
-                let document = Document::new("diagnose", &[], &[], &fault.result());
+                let document = JsonDocument::new("diagnose", &[], &[], &fault.result());
                 let report = stages::diagnose::data_fault(&fault, &given);
                 Ok((shown(&document.map_err(of_input)?, &report), None))
             }
             DiagnoseEnd::Diagnosed(found) => {
                 let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
                 let result = found.result(&machine);
-                let document = Document::new("diagnose", inputs, warnings, &result);
+                let document = JsonDocument::new("diagnose", inputs, warnings, &result);
                 let refined = found.model(&machine, file);
-                let report = stages::diagnose::diagnose(&stages::diagnose::Diagnose {
+                let report = stages::diagnose::diagnose(&stages::diagnose::DiagnoseReport {
                     machine: &machine,
                     file,
                     given: &given,
@@ -347,7 +347,7 @@ pub fn track(
     }
     work::run(py, move |control, _| {
         let found = identify::track(&all, control).map_err(of_stage)?;
-        let document = Document::new("track", &found.inputs, &found.warnings, &found);
+        let document = JsonDocument::new("track", &found.inputs, &found.warnings, &found);
         let report = stages::track::track(&found);
         Ok(shown(&document.map_err(of_input)?, &report))
     })

@@ -12,27 +12,27 @@ use cft_ident_logs::output::LogForm;
 
 /// Where a document goes: `-` is standard output.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Destination {
+pub enum DocumentDestination {
     Stdout,
     File(PathBuf),
 }
 
-impl Destination {
+impl DocumentDestination {
     pub fn file(&self) -> Option<&Path> {
         match self {
-            Destination::Stdout => None,
-            Destination::File(path) => Some(path),
+            DocumentDestination::Stdout => None,
+            DocumentDestination::File(path) => Some(path),
         }
     }
 }
 
-impl FromStr for Destination {
+impl FromStr for DocumentDestination {
     type Err = std::convert::Infallible;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         Ok(match text {
-            "-" => Destination::Stdout,
-            path => Destination::File(PathBuf::from(path)),
+            "-" => DocumentDestination::Stdout,
+            path => DocumentDestination::File(PathBuf::from(path)),
         })
     }
 }
@@ -158,8 +158,8 @@ mod tests {
 
     #[test]
     fn a_dash_is_standard_output_and_anything_else_a_file() {
-        assert_eq!("-".parse(), Ok(Destination::Stdout));
-        let file: Destination = "./-".parse().unwrap();
+        assert_eq!("-".parse(), Ok(DocumentDestination::Stdout));
+        let file: DocumentDestination = "./-".parse().unwrap();
         assert_eq!(file.file(), Some(Path::new("./-")));
     }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::simulate::{simulate_to, truth_beside, warnings};
 use super::{CliError, Context};
 use cft_ident_files::config::campaign::{CampaignLogs, CampaignSettings};
-use cft_ident_files::config::{self, Campaign, RobotFile, Trajectory, Wanted};
+use cft_ident_files::config::{self, CampaignFile, RobotFile, Trajectory, WantedFile};
 use cft_ident_plant::simulate::{EffectSpec, Experiment, Order};
 
 /// Robot file and motions of the campaign, as they come with the tool.
@@ -67,7 +67,7 @@ pub(super) fn simulate(
         files.extend([(*log).to_owned(), truth.display().to_string()]);
     }
     let said = said.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
-    let campaign = Campaign {
+    let campaign = CampaignFile {
         robot: "robot.toml".into(),
         truth: Some("identification.truth.toml".into()),
         logs: CampaignLogs {
@@ -83,7 +83,7 @@ pub(super) fn simulate(
     };
     let text = toml::to_string(&campaign)
         .map_err(|e| CliError::output(format!("the campaign cannot be expressed in TOML: {e}")))?;
-    let robot_text = config::text_of_kind(Path::new(ROBOT), Wanted::Robot)?;
+    let robot_text = config::text_of_kind(Path::new(ROBOT), WantedFile::Robot)?;
     let head = "# The built-in campaign: repeat it with `cft-ident identify campaign.toml`.\n\n";
     context.write_text(&folder.join("robot.toml"), &robot_text)?;
     context.write_text(&folder.join("campaign.toml"), &format!("{head}{text}"))?;

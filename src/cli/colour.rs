@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 
-use cft_ident_report::report::Tone;
+use cft_ident_report::report::FigureTone;
 use cft_ident_report::report::text::BETWEEN;
 
 const GREEN: &str = "32";
@@ -22,10 +22,10 @@ const WORDS: [(&str, &str); 7] = [
 ];
 
 /// Words behind a figure of the verdict, and its colour.
-const TONES: [(Tone, &str); 3] = [
-    (Tone::Better, GREEN),
-    (Tone::Worse, RED),
-    (Tone::High, YELLOW),
+const TONES: [(FigureTone, &str); 3] = [
+    (FigureTone::Better, GREEN),
+    (FigureTone::Worse, RED),
+    (FigureTone::High, YELLOW),
 ];
 
 /// Words at the beginning of a finding or of a message, and their colour.

@@ -6,7 +6,7 @@ use super::{
     CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, paths_of, pictures,
 };
 use cft_ident_logs::log::{LogSpec, escape};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify;
 use cft_ident_stages::replay::ReplayedPair;
@@ -66,7 +66,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(tried) = &of.tried {
         read.extend(tried.in_memory.inputs.iter().cloned());
     }
-    let document = Document::new("compare", &read, &of.warnings, &of.result())?;
+    let document = JsonDocument::new("compare", &read, &of.warnings, &of.result())?;
     let names = names_of(&args.logs);
     let shown: Vec<String> = names.iter().map(|name| escape(name)).collect();
     let mut report = stages::compare::compare(&of, &shown.join(", "));

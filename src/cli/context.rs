@@ -15,8 +15,8 @@ use indicatif::{
 
 use super::error::{CliError, indented, to_stderr};
 use super::{outputs, typed};
-use cft_ident_logs::output::Together;
-use cft_ident_report::report::{Detail, Screen, figure};
+use cft_ident_logs::output::FileBatch;
+use cft_ident_report::report::{ReportDetail, TerminalScreen, figure};
 use cft_ident_stages::identify::{self, Control};
 
 #[derive(Debug)]
@@ -25,22 +25,22 @@ pub struct Context {
     json: Option<PathBuf>,
     bars: bool,
     interrupted: Arc<AtomicBool>,
-    said: Mutex<Said>,
+    said: Mutex<CommandRemarks>,
     /// The command as it was typed, without folders from the root on and without what does not change a result.
     pub(super) command: String,
     /// How much of a result is shown, and how wide.
-    pub(super) screen: Screen,
+    pub(super) screen: TerminalScreen,
     /// The document goes to standard output, and nothing else.
     pub(super) prints_document: bool,
     /// [`Context::interrupted`] and the progress bars, for a stage of [`identify`].
     pub(super) control: Control,
     /// The outputs, which get their names together when the command has ended well.
-    pub(super) files: Together,
+    pub(super) files: FileBatch,
 }
 
 /// What a command leaves beside its result.
 #[derive(Debug, Default)]
-struct Said {
+struct CommandRemarks {
     page: Option<PathBuf>,
     /// The error that ends the command once its results are written.
     ending: Option<CliError>,
@@ -75,22 +75,22 @@ impl Context {
             interrupted,
             said: Mutex::default(),
             command: typed::line(arguments),
-            screen: Screen::of(Detail::Usual),
+            screen: TerminalScreen::of(ReportDetail::Usual),
             prints_document: false,
             control,
-            files: Together::default(),
+            files: FileBatch::default(),
         }
     }
 
-    fn said(&self) -> MutexGuard<'_, Said> {
+    fn said(&self) -> MutexGuard<'_, CommandRemarks> {
         self.said.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What is shown of a result that is no report: all of it, or `brief` where little is asked for.
     pub(super) fn text(&self, all: String, brief: &str) -> String {
         match self.screen.detail {
-            Detail::Brief => format!("{brief}\n"),
-            Detail::Usual | Detail::Full => all,
+            ReportDetail::Brief => format!("{brief}\n"),
+            ReportDetail::Usual | ReportDetail::Full => all,
         }
     }
 

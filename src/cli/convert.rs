@@ -13,7 +13,7 @@ use cft_ident_logs::log::{
     Block, Instant, LogSection, LogSpec, Provenance, RawBlock, RawReader, Reader, escape,
 };
 use cft_ident_logs::output::{LogForm, LogWriter};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_stages::identify::{LoggedRobot, repeated_rows};
 
 const EXAMPLE: &str = "\
@@ -56,7 +56,8 @@ pub struct Args {
 
 /// A log that was converted.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Converted {
+#[schemars(rename = "Converted")]
+pub struct ConvertedLog {
     /// Names of the columns, the time first.
     columns: Vec<String>,
     /// Rows.
@@ -280,13 +281,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check()?;
     let duration: f64 = provenance.iter().map(|p| p.duration_s).sum();
     let name = args.output.file_name();
-    let result = Converted {
+    let result = ConvertedLog {
         columns: target.columns,
         samples: target.rows,
         duration_s: duration,
         file: name.map(|name| name.to_string_lossy().into_owned()),
     };
-    let document = Document::new("convert", &provenance, &warnings, &result)?;
+    let document = JsonDocument::new("convert", &provenance, &warnings, &result)?;
     if let Some(writer) = target.writer {
         context.files.add_log(writer)?;
     }

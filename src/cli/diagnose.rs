@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup, typed,
 };
-use cft_ident_core::diagnose::Wishes;
+use cft_ident_core::diagnose::DiagnosisOptions;
 use cft_ident_logs::log::LogSpec;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::{provenance, quality, residual};
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{
@@ -90,7 +90,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         keep: args.keep,
         candidates: own.map_or(Vec::new(), |given| given.value),
         hold_friction: args.hold_friction,
-        wishes: Wishes {
+        wishes: DiagnosisOptions {
             search: args.search,
             accepted: args.accept.iter().map(|text| accepted(text)).collect(),
         },
@@ -122,7 +122,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 setup,
                 ..fault.result()
             };
-            let document = Document::new("diagnose", &[], &[], &result)?;
+            let document = JsonDocument::new("diagnose", &[], &[], &result)?;
             return Ok(Outcome::new(report.text_for(context.screen), document));
         }
     };
@@ -137,10 +137,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         faults: fault.into_iter().collect(),
         ..plain
     };
-    let document = Document::new("diagnose", inputs, warnings, &result)?;
+    let document = JsonDocument::new("diagnose", inputs, warnings, &result)?;
     let refined = found.model(&machine, file);
     let written = args.output.as_ref().unwrap_or(&args.model);
-    let of = stages::diagnose::Diagnose {
+    let of = stages::diagnose::DiagnoseReport {
         machine: &machine,
         file,
         given: &given.provenance,

@@ -14,7 +14,7 @@ use cft_ident_drive::drive::read::{self, ReadRequest};
 use cft_ident_drive::drive::track::DriveLog;
 use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{DataRole, LogSpec, Provenance, escape};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages::drive as words;
 
 const EXAMPLE: &str = "\
@@ -252,7 +252,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     Ok(Outcome::new(
         report.text_for(context.screen),
-        Document::new("drive", &provenances, &warnings, &drives)?,
+        JsonDocument::new("drive", &provenances, &warnings, &drives)?,
     ))
 }
 

@@ -12,8 +12,8 @@ use cft_ident_logs::log::unpacked;
 use cft_ident_plant::simulate::held::SimulatedHolds;
 use cft_ident_plant::simulate::servo::{BenchMotion, ServoPlant, ServoRig, run_servo};
 use cft_ident_plant::simulate::wrist::SimulatedTool;
-use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::table::{CellAlignment, Table};
 
 const EXAMPLE: &str = "\
 Example:
@@ -56,7 +56,7 @@ pub enum ExampleMachine {
 }
 
 /// A file that the program carries.
-enum Content {
+enum ExampleContent {
     Plain(&'static [u8]),
     /// Compressed with zstd.
     Packed(&'static [u8]),
@@ -72,7 +72,7 @@ pub(super) struct Machine {
     /// Licence of its data; null of a simulation.
     licence: Option<&'static str>,
     origin: &'static str,
-    files: &'static [(&'static str, Content)],
+    files: &'static [(&'static str, ExampleContent)],
     /// Commands to go on with; `{}` is the folder.
     next: &'static str,
 }
@@ -92,11 +92,20 @@ static UR10: Machine = Machine {
         ur10.mcap holds its messages; ur10.csv the same numbers; ur10.urdf its ur10_robot.urdf.\n\
         ur10.toml is the robot file.\n",
     files: &[
-        ("ur10.csv", Content::Packed(carried!("ur10/ur10.csv.zst"))),
-        ("ur10.mcap", Content::Plain(carried!("ur10/ur10.mcap"))),
-        ("ur10.urdf", Content::Plain(carried!("ur10/ur10.urdf"))),
-        ("ur10.toml", Content::Config("configs/ur10.toml")),
-        ("LICENSE", Content::Plain(carried!("ur10/LICENSE"))),
+        (
+            "ur10.csv",
+            ExampleContent::Packed(carried!("ur10/ur10.csv.zst")),
+        ),
+        (
+            "ur10.mcap",
+            ExampleContent::Plain(carried!("ur10/ur10.mcap")),
+        ),
+        (
+            "ur10.urdf",
+            ExampleContent::Plain(carried!("ur10/ur10.urdf")),
+        ),
+        ("ur10.toml", ExampleContent::Config("configs/ur10.toml")),
+        ("LICENSE", ExampleContent::Plain(carried!("ur10/LICENSE"))),
     ],
     next: "cft-ident lsq {}/ur10.csv@0..70% -r {}/ur10.toml -o model.toml\n\
         cft-ident validate {}/ur10.csv@70..100% -m model.toml --report report.html\n",
@@ -113,14 +122,20 @@ static TX40: Machine = Machine {
         70 % of the record, for joints 5 and 6 hardly move in the rest.\n\
         tx40.toml is the robot file; the coupling of joints 5 and 6 is not declared in it.\n",
     files: &[
-        ("tx40.csv", Content::Packed(carried!("tx40/tx40.csv.zst"))),
-        ("tx40.urdf", Content::Plain(carried!("tx40/tx40.urdf"))),
-        ("tx40.toml", Content::Config("configs/tx40.toml")),
+        (
+            "tx40.csv",
+            ExampleContent::Packed(carried!("tx40/tx40.csv.zst")),
+        ),
+        (
+            "tx40.urdf",
+            ExampleContent::Plain(carried!("tx40/tx40.urdf")),
+        ),
+        ("tx40.toml", ExampleContent::Config("configs/tx40.toml")),
         (
             "LICENSE",
-            Content::Plain(include_bytes!("../../LICENSE-APACHE")),
+            ExampleContent::Plain(include_bytes!("../../LICENSE-APACHE")),
         ),
-        ("NOTICE", Content::Plain(carried!("tx40/NOTICE"))),
+        ("NOTICE", ExampleContent::Plain(carried!("tx40/NOTICE"))),
     ],
     next: "cft-ident lsq {}/tx40.csv -r {}/tx40.toml -o model.toml\n\
         cft-ident diagnose {}/tx40.csv -m model.toml -o refined.toml --report report.html\n",
@@ -135,9 +150,12 @@ static BLDC: Machine = Machine {
         Source: repository heitor-andrade/laas_anti_cogging, commit eb0391d7, BSD-3-Clause (LICENSE).\n\
         bldc.toml is the robot file.\n",
     files: &[
-        ("bldc.csv", Content::Packed(carried!("bldc/bldc.csv.zst"))),
-        ("bldc.toml", Content::Config("configs/bldc.toml")),
-        ("LICENSE", Content::Plain(carried!("bldc/LICENSE"))),
+        (
+            "bldc.csv",
+            ExampleContent::Packed(carried!("bldc/bldc.csv.zst")),
+        ),
+        ("bldc.toml", ExampleContent::Config("configs/bldc.toml")),
+        ("LICENSE", ExampleContent::Plain(carried!("bldc/LICENSE"))),
     ],
     next: "cft-ident lsq {}/bldc.csv@15.2..23s -r {}/bldc.toml -o model.toml\n\
         cft-ident diagnose {}/bldc.csv@15.2..23s -m model.toml \\\n  \
@@ -196,7 +214,7 @@ static WRIST: Machine = Machine {
     origin: "A simulated tool of 0.85 kg on a wrist force-torque sensor whose bias drifts over 60 poses.\n",
     files: &[(
         "wrist.csv",
-        Content::Made(|| SimulatedTool::example().log(SEED)),
+        ExampleContent::Made(|| SimulatedTool::example().log(SEED)),
     )],
     next: "cft-ident tool {}/wrist.csv -o tool.toml --report tool.html\n\
         cft-ident export -m tool.toml --controller ur\n",
@@ -211,11 +229,11 @@ static HOLDS: Machine = Machine {
     files: &[
         (
             "holds.csv",
-            Content::Made(|| SimulatedHolds::example().log(SEED)),
+            ExampleContent::Made(|| SimulatedHolds::example().log(SEED)),
         ),
         (
             "holds.toml",
-            Content::Made(|| SimulatedHolds::ROBOT.to_owned()),
+            ExampleContent::Made(|| SimulatedHolds::ROBOT.to_owned()),
         ),
     ],
     next: "cft-ident lsq --static {}/holds.csv -r {}/holds.toml -o gravity.toml\n\
@@ -258,9 +276,9 @@ impl ExampleMachine {
 }
 
 /// All examples, in the order of the list.
-fn known() -> impl Iterator<Item = Known> {
+fn known() -> impl Iterator<Item = KnownExample> {
     let all = ExampleMachine::value_variants().iter();
-    all.map(|of| of.machine()).map(|machine| Known {
+    all.map(|of| of.machine()).map(|machine| KnownExample {
         name: machine.name,
         what: machine.what,
         licence: machine.licence,
@@ -269,7 +287,8 @@ fn known() -> impl Iterator<Item = Known> {
 
 /// An example that can be written.
 #[derive(Debug, Serialize, JsonSchema)]
-struct Known {
+#[schemars(rename = "Known")]
+struct KnownExample {
     name: &'static str,
     /// The machine and its files.
     what: &'static str,
@@ -279,15 +298,17 @@ struct Known {
 
 /// Examples that there are, and what was written of the one that was asked for.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Examples {
-    examples: Vec<Known>,
+#[schemars(rename = "Examples")]
+pub struct ExampleList {
+    examples: Vec<KnownExample>,
     /// Null where none was asked for.
-    written: Option<Written>,
+    written: Option<WrittenExample>,
 }
 
 /// An example in a folder.
 #[derive(Debug, Serialize, JsonSchema)]
-struct Written {
+#[schemars(rename = "Written")]
+struct WrittenExample {
     name: &'static str,
     /// Folder as it was named.
     folder: String,
@@ -310,7 +331,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             let listed = format!("written to {shown}: {}", files.join(", "));
             let then = next.trim_end().replace('\n', "\n  ");
             text = context.text(format!("{listed}\n\ngo on with:\n  {then}\n"), &listed);
-            written = Some(Written {
+            written = Some(WrittenExample {
                 name: machine.name,
                 folder: shown,
                 files,
@@ -318,16 +339,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             });
         }
     }
-    let result = Examples {
+    let result = ExampleList {
         examples: known().collect(),
         written,
     };
-    let document = Document::new("example", &[], &[], &result)?;
+    let document = JsonDocument::new("example", &[], &[], &result)?;
     Ok(Outcome::new(text, document))
 }
 
 fn list() -> String {
-    let columns = ["name", "machine", "licence"].map(|name| (name, Align::Left));
+    let columns = ["name", "machine", "licence"].map(|name| (name, CellAlignment::Left));
     let mut table = Table::new(&columns);
     known().for_each(|known| table.row([known.name, known.what, known.licence.unwrap_or("")]));
     format!("{table}\ncft-ident example NAME writes it into the folder NAME\n")
@@ -364,10 +385,12 @@ pub(super) fn write(
     }
     for (name, content) in machine.files {
         let bytes = match content {
-            Content::Plain(bytes) => bytes.to_vec(),
-            Content::Packed(bytes) => unpacked(bytes).map_err(|e| unusable(&e))?,
-            Content::Made(made) => made().into_bytes(),
-            Content::Config(path) => config::embedded(Path::new(path)).unwrap_or_default().into(),
+            ExampleContent::Plain(bytes) => bytes.to_vec(),
+            ExampleContent::Packed(bytes) => unpacked(bytes).map_err(|e| unusable(&e))?,
+            ExampleContent::Made(made) => made().into_bytes(),
+            ExampleContent::Config(path) => {
+                config::embedded(Path::new(path)).unwrap_or_default().into()
+            }
         };
         contents.push(((*name).to_owned(), bytes));
     }

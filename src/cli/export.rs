@@ -20,16 +20,16 @@ use super::{
 };
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::no_torque;
-use cft_ident_export::export::arm::{Arm, Says};
+use cft_ident_export::export::arm::{Arm, FormatSupport};
 use cft_ident_export::export::dissipative::below_zero;
-use cft_ident_export::export::left_out::{self, Elsewhere};
+use cft_ident_export::export::left_out::{self, OmissionPlace};
 use cft_ident_export::export::{self, ExportError, Note, Program, urdf_source};
 use cft_ident_files::config::{
     self, ModelFile, UrdfReplacement, replaced_in_mjcf, replaced_in_urdf,
 };
 use cft_ident_logs::log::{LogSpec, escape};
-use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::table::{CellAlignment, Table};
 use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, InMemory};
 use cft_ident_tool::held::gravity_in_python;
 use cft_ident_tool::tool::{RobotController, ToolFile};
@@ -154,20 +154,22 @@ pub struct Args {
 
 /// A model that was written for other programs.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Exported {
+#[schemars(rename = "Exported")]
+pub struct ExportedModel {
     joints: Vec<String>,
-    files: Vec<Written>,
+    files: Vec<WrittenFile>,
     /// Effects that the files do not hold.
     left_out: Vec<String>,
     /// What the files of simulators cannot say, file by file.
-    beyond: Vec<Beyond>,
+    beyond: Vec<FormatOmission>,
     /// Lines for a controller; null where none were asked for.
     lines: Option<Vec<String>>,
 }
 
 /// What a format cannot say.
 #[derive(Debug, Serialize, JsonSchema)]
-struct Beyond {
+#[schemars(rename = "Beyond")]
+struct FormatOmission {
     /// The file.
     file: String,
     /// What it is.
@@ -180,7 +182,8 @@ struct Beyond {
 
 /// A file that was written.
 #[derive(Debug, Serialize, JsonSchema)]
-struct Written {
+#[schemars(rename = "Written")]
+struct WrittenFile {
     /// Its name.
     file: String,
     /// What it is.
@@ -198,16 +201,16 @@ struct Format<'a> {
     what: &'static str,
     /// The list beside it.
     side: PathBuf,
-    says: Says,
-    text: Text,
+    says: FormatSupport,
+    text: FormatWriter,
 }
 
 /// The text of a format, of an arm and the lines at its head.
-type Text = fn(&Arm, &[String]) -> String;
+type FormatWriter = fn(&Arm, &[String]) -> String;
 
 fn formats(args: &Args) -> Vec<Format<'_>> {
     use export::{mjcf, sdf, usd};
-    let all: [(&Option<PathBuf>, &'static str, Says, Text); 3] = [
+    let all: [(&Option<PathBuf>, &'static str, FormatSupport, FormatWriter); 3] = [
         (&args.mjcf, "MJCF", mjcf::SAYS, mjcf::mjcf),
         (&args.sdf, "SDF", sdf::SAYS, sdf::sdf),
         (&args.usd, "USD", usd::SAYS, usd::usd),
@@ -349,8 +352,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             _ => true,
         };
         let elsewhere = match beside {
-            true => Elsewhere::Beside,
-            false => Elsewhere::Nowhere,
+            true => OmissionPlace::Beside,
+            false => OmissionPlace::Nowhere,
         };
         if beside {
             urdf_lines.extend(beside_urdf(&kept, &left_out));
@@ -396,7 +399,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             }
             head.extend(below_zero(&given.value.file, model));
             let side = export::left_out::side_file(&found, &head, &logs).map_err(failed)?;
-            head.extend(left_out::lines(&found, &logs, Elsewhere::Nowhere));
+            head.extend(left_out::lines(&found, &logs, OmissionPlace::Nowhere));
             head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
             let of_source = args.mjcf_source.as_deref();
             let text = match of_source.filter(|_| args.mjcf.as_deref() == Some(format.path)) {
@@ -410,7 +413,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             };
             texts.push((format.path, format.what, text));
             texts.push((&format.side, "what it cannot say", side));
-            beyond.extend(found.into_iter().map(|part| Beyond {
+            beyond.extend(found.into_iter().map(|part| FormatOmission {
                 file: file_name(format.path),
                 what: part.what,
                 joint: part.joint,
@@ -448,7 +451,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     for (path, _, text) in &texts {
         context.write_text(path, text)?;
     }
-    let mut table = Table::new(&[("file", Align::Left), ("what", Align::Left)])
+    let mut table = Table::new(&[("file", CellAlignment::Left), ("what", CellAlignment::Left)])
         .caption(&format!("{} for other programs", given.name));
     for (path, what, _) in &texts {
         table.row([path.display().to_string().as_str(), what]);
@@ -463,11 +466,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if args.c.is_some() || args.rust.is_some() {
         warnings.extend(never_driving);
     }
-    let written = texts.iter().map(|(path, what, _)| Written {
+    let written = texts.iter().map(|(path, what, _)| WrittenFile {
         file: file_name(path),
         what: (*what).to_owned(),
     });
-    let result = Exported {
+    let result = ExportedModel {
         joints: program.joints.clone(),
         files: written.collect(),
         left_out,
@@ -486,6 +489,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let brief = format!("written: {}", files.join(", "));
     Ok(Outcome::new(
         context.text(text, &brief),
-        Document::new("export", &inputs, &warnings, &result)?,
+        JsonDocument::new("export", &inputs, &warnings, &result)?,
     ))
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::error::CliError;
 use super::{Context, file_name};
 use cft_ident_files::config::candidates::{self, CandidateSection};
-use cft_ident_files::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
+use cft_ident_files::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, WantedFile};
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_stages::identify::GivenModel;
 
@@ -21,7 +21,7 @@ pub struct ReadFile<T> {
 
 fn read<T>(
     path: &Path,
-    wanted: Wanted,
+    wanted: WantedFile,
     parse: impl Fn(&str, &str) -> Result<T, ConfigError>,
 ) -> Result<ReadFile<T>, CliError> {
     let name = escape(&path.to_string_lossy());
@@ -35,14 +35,14 @@ fn read<T>(
 
 /// A robot file, or one that comes with the tool.
 pub fn robot(path: &Path) -> Result<ReadFile<RobotFile>, CliError> {
-    read(path, Wanted::Robot, |name, text| {
+    read(path, WantedFile::Robot, |name, text| {
         RobotFile::parse_in(name, text, path.parent())
     })
 }
 
 /// A model file; what is reported of it becomes a warning of the command.
 pub fn model(path: &Path, context: &Context) -> Result<ReadFile<GivenModel>, CliError> {
-    let model = read(path, Wanted::Own, |name, text| {
+    let model = read(path, WantedFile::Own, |name, text| {
         let file = ModelFile::parse_in(name, text, path.parent())?;
         // the name for messages may be cut
         Ok(GivenModel {
@@ -57,7 +57,7 @@ pub fn model(path: &Path, context: &Context) -> Result<ReadFile<GivenModel>, Cli
 
 /// The text of a model file as it stands.
 pub(crate) fn text(path: &Path) -> Result<String, CliError> {
-    Ok(config::text_of_kind(path, Wanted::Own)?)
+    Ok(config::text_of_kind(path, WantedFile::Own)?)
 }
 
 /// A model file of the robot given.
@@ -89,10 +89,10 @@ pub(super) fn friction(
 
 /// A file of effects of the user's own.
 pub fn candidates(path: &Path) -> Result<ReadFile<Vec<CandidateSection>>, CliError> {
-    read(path, Wanted::Own, candidates::parse)
+    read(path, WantedFile::Own, candidates::parse)
 }
 
 /// A trajectory file, or one that comes with the tool.
 pub fn trajectory(path: &Path) -> Result<ReadFile<Trajectory>, CliError> {
-    read(path, Wanted::Trajectory, Trajectory::parse)
+    read(path, WantedFile::Trajectory, Trajectory::parse)
 }

@@ -7,7 +7,7 @@ use super::{
     setup, typed, written,
 };
 use cft_ident_logs::log::LogSpec;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{self, Dataset, FrictionSettings, LoggedRobot};
 
@@ -76,7 +76,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let before = checked.warnings.iter().cloned();
     found.warnings.splice(0..0, before);
     let model = found.model(machine, old.as_ref());
-    let document = Document::new("friction", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("friction", &found.inputs, &found.warnings, &found)?;
     let of = stages::friction::Friction {
         machine,
         found: &found,

@@ -9,7 +9,7 @@ use cft_ident_files::config::model_file::{Covariance, Parameter, Verdict};
 use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::{LogSpec, Provenance};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{LoggedRobot, new_model};
 use cft_ident_tool::held::{GravityFit, GravityNumber, HeldError, fit_gravity, read_held};
@@ -63,7 +63,7 @@ pub(super) fn run(args: &HeldRun, context: &Context) -> Result<Outcome, CliError
             ));
         }
     }
-    let document = Document::new("lsq-static", &inputs, &warnings, &found)?;
+    let document = JsonDocument::new("lsq-static", &inputs, &warnings, &found)?;
     Ok(Outcome::new(report.text_for(context.screen), document))
 }
 

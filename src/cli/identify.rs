@@ -8,15 +8,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::beside_truth::{BesideTruth, load_truth, true_value};
-use super::named::{self, Named, is_urdf};
+use super::named::{self, IdentifyTarget, is_urdf};
 use super::{
     CliError, Context, Outcome, campaign, file_name, held_out, logs_of, names_of, new, pictures,
     setup, typed, validate,
 };
 use cft_ident_files::config::campaign::CampaignSettings;
-use cft_ident_files::config::{self, Campaign};
+use cft_ident_files::config::{self, CampaignFile};
 use cft_ident_logs::log::LogSpec;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::residual;
 use cft_ident_report::report::stages;
 use cft_ident_report::report::stages::identify::ShownLogs;
@@ -88,9 +88,10 @@ const STAGES: [&str; 6] = [
     "missing effects",
     "report",
 ];
-struct Work {
+/// A campaign that is being identified.
+struct IdentifyJob {
     name: String,
-    campaign: Campaign,
+    campaign: CampaignFile,
     /// Folder from which the campaign names its logs.
     base: PathBuf,
     machine: LoggedRobot,
@@ -107,15 +108,15 @@ struct Work {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let named = named::named(&args.files, (args.urdf.as_deref(), &args.log), context)?;
     let folder = args.output.clone().unwrap_or_else(|| match &named {
-        Named::BuiltIn => PathBuf::from(FOLDER),
+        IdentifyTarget::BuiltIn => PathBuf::from(FOLDER),
         // beside the campaign; a robot may lie anywhere
-        Named::Robot(file, _) => {
+        IdentifyTarget::Robot(file, _) => {
             let name = file.file_stem().unwrap_or_default();
             PathBuf::from(name).with_extension("run")
         }
-        Named::Campaign(file) => file.with_extension("run"),
+        IdentifyTarget::Campaign(file) => file.with_extension("run"),
     });
-    if let Named::Campaign(file) = &named {
+    if let IdentifyTarget::Campaign(file) = &named {
         // read again below: no folder is made for a campaign that cannot be run
         named::campaign(file)?;
     }
@@ -124,13 +125,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             .hint("name another one with -o")
     })?;
     let work = match &named {
-        Named::Robot(robot, logs) => {
-            Work::of_robot((robot.as_path(), logs.as_slice()), args, &folder, context)?
+        IdentifyTarget::Robot(robot, logs) => {
+            IdentifyJob::of_robot((robot.as_path(), logs.as_slice()), args, &folder, context)?
         }
-        Named::Campaign(file) => Work::of_campaign(file, Vec::new())?,
-        Named::BuiltIn => {
+        IdentifyTarget::Campaign(file) => IdentifyJob::of_campaign(file, Vec::new())?,
+        IdentifyTarget::BuiltIn => {
             let (_, warnings) = campaign::simulate(&folder, args.seed.unwrap_or(SEED), context)?;
-            Work::of_campaign(&folder.join("campaign.toml"), warnings)?
+            IdentifyJob::of_campaign(&folder.join("campaign.toml"), warnings)?
         }
     };
     let mut outcome = execute(work, &folder, args, context)?;
@@ -141,9 +142,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     Ok(outcome)
 }
 
-impl Work {
+impl IdentifyJob {
     fn of_campaign(file: &Path, warnings: Vec<String>) -> Result<Self, CliError> {
-        let campaign = Campaign::load(file)?;
+        let campaign = CampaignFile::load(file)?;
         let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
         let robot = resolve(&base, &campaign.robot);
         Ok(Self {
@@ -204,7 +205,7 @@ impl Work {
         let of = file_name(file);
         Ok(Self {
             name: format!("{of} with {names}"),
-            campaign: Campaign {
+            campaign: CampaignFile {
                 robot: of,
                 truth: None,
                 logs,
@@ -248,11 +249,16 @@ fn logs(
     specs.iter().map(log).collect()
 }
 
-fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<Outcome, CliError> {
+fn execute(
+    work: IdentifyJob,
+    folder: &Path,
+    args: &Args,
+    context: &Context,
+) -> Result<Outcome, CliError> {
     let (campaign, base) = (&work.campaign, &*work.base);
     let (mut guesses, mut warnings) = (work.guesses, work.warnings);
     let roles = &campaign.logs;
-    let mut out = Folder {
+    let mut out = StageFolder {
         path: folder,
         context,
         files: Vec::new(),
@@ -341,7 +347,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         true => PathBuf::from(written),
         false => folder.join(written),
     };
-    let of = stages::identify::Identify {
+    let of = stages::identify::IdentifyReport {
         machine: &machine,
         campaign: &work.name,
         found: &found,
@@ -370,7 +376,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     };
     // the logs of the set-up have the one-joint logs among them
     let all = training.iter().chain(&unseen);
-    let origin = stages::identify::Origin {
+    let origin = stages::identify::CampaignOrigin {
         campaign: &by_names(campaign),
         inputs: &found.inputs,
         warnings: &warnings,
@@ -388,7 +394,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     out.write("summary.txt", &report.text())?;
     out.files.push("result.json".into());
     let latest = found.refined.as_ref().unwrap_or(&found.model);
-    let result = Identified {
+    let result = StageResults {
         setup: &checked.report.findings,
         guesses: (!guesses.is_empty()).then_some(&guesses[..]),
         friction: found.friction.as_ref().map(|(laws, _)| laws),
@@ -398,7 +404,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
         truth: truth.as_ref().map(|truth| BesideTruth::of(latest, truth)),
         files: out.files,
     };
-    let document = Document::new("identify", &found.inputs, &warnings, &result)?;
+    let document = JsonDocument::new("identify", &found.inputs, &warnings, &result)?;
     context.write_text(&folder.join("result.json"), &document.text())?;
     let (limit, validated) = (campaign.settings.max_relative_error, &found.validated);
     let missed = validated
@@ -411,7 +417,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
 }
 
 /// A campaign as text, its files by their names alone.
-fn by_names(campaign: &Campaign) -> String {
+fn by_names(campaign: &CampaignFile) -> String {
     let mut named = campaign.clone();
     let logs = &mut named.logs;
     let roles = [
@@ -430,7 +436,8 @@ fn by_names(campaign: &Campaign) -> String {
 
 /// The results of all stages.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Identified<'a> {
+#[schemars(rename = "Identified")]
+pub struct StageResults<'a> {
     /// What the check of the set-up found.
     setup: &'a [Finding],
     /// What was guessed of the robot file, each with the line to change; null where nothing was.
@@ -453,7 +460,7 @@ fn keep(
     end: StageEnd,
     machine: &LoggedRobot,
     unseen: &str,
-    out: &mut Folder,
+    out: &mut StageFolder,
 ) -> Result<(), CliError> {
     match end {
         StageEnd::Friction(found, model) => {
@@ -472,13 +479,14 @@ fn keep(
     }
 }
 
-struct Folder<'a> {
+/// The folder of the results, and the files that are in it.
+struct StageFolder<'a> {
     path: &'a Path,
     context: &'a Context,
     files: Vec<String>,
 }
 
-impl Folder<'_> {
+impl StageFolder<'_> {
     fn write(&mut self, name: &str, text: &str) -> Result<(), CliError> {
         self.context.write_text(&self.path.join(name), text)?;
         self.files.push(name.to_owned());

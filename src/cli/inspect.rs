@@ -10,13 +10,13 @@ use cft_ident_core::robot::model::Model;
 use cft_ident_core::{motion, number};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::inspect::{
-    FaultKind, Findings, Inspection, LogFault, OrderComparison, look, look_again,
+    FaultKind, Inspection, LogFault, LogFindings, OrderComparison, look, look_again,
 };
 use cft_ident_logs::log::{
     LogSection, LogSpec, Provenance, RawReader, TopicFacts, escape, listing,
 };
-use cft_ident_report::report::Detail;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::ReportDetail;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{Dataset, IdentifyError, LoggedRobot, repeated_rows};
 use cft_ident_stages::setup::{Finding, SetupReport};
@@ -57,12 +57,12 @@ pub struct InspectionResult {
 }
 
 /// A robot as it was identified.
-struct Known {
+struct KnownRobot {
     machine: LoggedRobot,
     model: Option<Model>,
 }
 
-impl Known {
+impl KnownRobot {
     fn load(args: &Args) -> Result<Option<Self>, CliError> {
         if let Some(path) = &args.model {
             let name = path.display().to_string();
@@ -83,7 +83,7 @@ fn looked_at(
     topic: Option<String>,
     machine: Option<&LoggedRobot>,
     context: &Context,
-) -> Result<(Findings, RawReader), CliError> {
+) -> Result<(LogFindings, RawReader), CliError> {
     let section = LogSection {
         topic,
         ..LogSection::default()
@@ -114,7 +114,7 @@ pub(super) fn findings(
     spec: &LogSpec,
     machine: &LoggedRobot,
     context: &Context,
-) -> Result<Findings, CliError> {
+) -> Result<LogFindings, CliError> {
     Ok(looked_at(spec, None, Some(machine), context)?.0)
 }
 
@@ -122,15 +122,15 @@ pub(super) fn findings(
 fn inspect(
     spec: &LogSpec,
     topic: Option<String>,
-    known: Option<&Known>,
+    known: Option<&KnownRobot>,
     context: &Context,
     warnings: &mut Vec<String>,
-) -> Result<(Findings, Provenance), CliError> {
+) -> Result<(LogFindings, Provenance), CliError> {
     let machine = known.map(|known| &known.machine);
     let (mut findings, log) = looked_at(spec, topic, machine, context)?;
     let name = escape(&spec.name());
     warnings.extend(log.warnings().iter().map(|text| format!("{name}: {text}")));
-    if let Some(Known {
+    if let Some(KnownRobot {
         machine,
         model: Some(model),
     }) = known
@@ -214,7 +214,7 @@ const REVERSALS: u64 = 6;
 const ROWS_HZ: f64 = 5.0;
 
 /// That a log holds poses, and the way for it.
-fn held_poses(name: &str, found: &Findings) -> Option<String> {
+fn held_poses(name: &str, found: &LogFindings) -> Option<String> {
     let moving = || found.joints.iter().filter(|joint| joint.moves);
     let reversals = moving().map(|joint| joint.reversals).max()?;
     let slow = moving().all(|joint| joint.moving_share < MOVING_SHARE) && reversals >= REVERSALS;
@@ -259,7 +259,7 @@ fn topics_text(topics: &[TopicFacts]) -> String {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(paths_of(&args.logs), [])?;
-    let known = Known::load(args)?;
+    let known = KnownRobot::load(args)?;
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
     let (mut logs, mut provenance) = (Vec::new(), Vec::new());
     let mut all_topics = Vec::new();
@@ -283,7 +283,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if unknown && let Err(error) = RawReader::open(spec, None) {
             warnings.push(format!("{}: {error}", escape(&spec.name())));
             provenance.push(Provenance::of_file(&spec.path)?);
-            logs.push((spec.name(), Findings::default()));
+            logs.push((spec.name(), LogFindings::default()));
             all_topics.extend(listed);
             bar.advance(1);
             continue;
@@ -304,7 +304,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     drop(bar);
     context.check()?;
     let mut report = SetupReport::default();
-    if let Some(Known {
+    if let Some(KnownRobot {
         machine,
         model: None,
     }) = &known
@@ -321,12 +321,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         setup: report.findings,
         topics: (!all_topics.is_empty()).then_some(all_topics),
     };
-    let shown = match known.is_some() || context.screen.detail == Detail::Brief {
+    let shown = match known.is_some() || context.screen.detail == ReportDetail::Brief {
         true => String::new(),
         false => topics_text(result.topics.as_deref().unwrap_or_default()),
     };
     Ok(Outcome::new(
         text.text_for(context.screen) + &shown,
-        Document::new("inspect", &provenance, &warnings, &result)?,
+        JsonDocument::new("inspect", &provenance, &warnings, &result)?,
     ))
 }

@@ -10,7 +10,7 @@ use super::{
 };
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::LogSpec;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{self, Dataset, LoggedRobot, LsqSettings, refined};
 
@@ -124,9 +124,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if args.open_loop.is_some() && !args.unconstrained {
         identify::project(&mut model)?;
     }
-    let document = Document::new("lsq", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("lsq", &found.inputs, &found.warnings, &found)?;
     let names = names_of(&args.logs);
-    let of = stages::lsq::Lsq {
+    let of = stages::lsq::LsqReport {
         machine,
         found: &found,
         file: &model,

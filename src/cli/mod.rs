@@ -61,10 +61,10 @@ use clap::{Parser, Subcommand};
 use cft_ident_logs::log::LogSpec;
 use cft_ident_logs::output;
 use cft_ident_report::report::table::folded;
-use cft_ident_report::report::{Detail, Report, Screen};
+use cft_ident_report::report::{Report, ReportDetail, TerminalScreen};
 use cft_ident_stages::identify::{Log, ReducedLogs, is_reduced};
 
-use arguments::Destination;
+use arguments::DocumentDestination;
 use context::Context;
 pub use error::CliError;
 pub use exit::Exit;
@@ -136,9 +136,9 @@ The help of each command ends with examples; --help-all has every option. Their 
 /// Identification of robot dynamics from logged joint positions and torques.
 #[derive(Debug, Parser)]
 #[command(name = "cft-ident", version, term_width = window::columns(window::Stream::Output).min(100), after_help = EXAMPLES, disable_help_flag = true)]
-pub struct Cli {
+pub struct CommandLine {
     #[command(flatten)]
-    common: Common,
+    common: CommonOptions,
     #[command(subcommand)]
     command: Command,
 }
@@ -146,11 +146,11 @@ pub struct Cli {
 /// Options that every command takes.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Options of every command")]
-struct Common {
+struct CommonOptions {
     /// Write the result as one JSON document to FILE (`-`: to standard output, and nothing else
     /// there)
     #[arg(long, value_name = "FILE", global = true)]
-    json: Option<Destination>,
+    json: Option<DocumentDestination>,
     /// No progress, no notes, and of the result its verdict alone; warnings and errors stay
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -262,7 +262,7 @@ fn stop() -> ! {
 /// Runs one command line, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<AtomicBool>) -> Exit {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = match Cli::try_parse_from(&arguments) {
+    let cli = match CommandLine::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(answer) => {
             if let Some(error) = removed::named(&answer, &arguments) {
@@ -296,7 +296,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
 /// Runs one command line, the program's name first, and gives its result instead of showing it; the files that it
 /// writes get their names.
 pub fn perform(arguments: &[OsString], interrupted: Arc<AtomicBool>) -> Result<Outcome, CliError> {
-    let cli = Cli::try_parse_from(arguments)
+    let cli = CommandLine::try_parse_from(arguments)
         .map_err(|answer| CliError::usage(answer.render().to_string().trim_end()))?;
     let context = Context::new(true, None, interrupted, arguments);
     let mut outcome = cli.command.run(&context)?;
@@ -306,7 +306,7 @@ pub fn perform(arguments: &[OsString], interrupted: Arc<AtomicBool>) -> Result<O
 }
 
 fn execute(
-    cli: &Cli,
+    cli: &CommandLine,
     arguments: &[OsString],
     interrupted: Arc<AtomicBool>,
 ) -> Result<Exit, CliError> {
@@ -319,17 +319,17 @@ fn execute(
     }
     let json = cli.common.json.as_ref();
     let quiet = cli.common.quiet;
-    let document = json.and_then(Destination::file);
+    let document = json.and_then(DocumentDestination::file);
     let mut context = Context::new(quiet, document, interrupted, arguments);
-    context.screen = Screen {
+    context.screen = TerminalScreen {
         detail: match (quiet, cli.common.verbose) {
-            (true, _) => Detail::Brief,
-            (_, true) => Detail::Full,
-            _ => Detail::Usual,
+            (true, _) => ReportDetail::Brief,
+            (_, true) => ReportDetail::Full,
+            _ => ReportDetail::Usual,
         },
         width: window::columns(window::Stream::Output),
     };
-    context.prints_document = matches!(json, Some(Destination::Stdout));
+    context.prints_document = matches!(json, Some(DocumentDestination::Stdout));
     // Said before the long run, also by a command that has no other output.
     context.check_outputs([], [])?;
     let mut outcome = cli.command.run(&context)?;
@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn every_help_fits_80_columns_and_a_screen_and_has_an_example() {
-        let all = super::Cli::command();
+        let all = super::CommandLine::command();
         for command in all.get_subcommands().filter(|c| !c.is_hide_set()) {
             let mut alone = command.clone().max_term_width(80);
             let text = alone.render_long_help().to_string();

@@ -6,12 +6,12 @@ use clap::ValueEnum;
 
 use super::example::{self, ExampleMachine};
 use super::{CliError, Context};
-use cft_ident_files::config::{Campaign, RobotFile};
+use cft_ident_files::config::{CampaignFile, RobotFile};
 use cft_ident_logs::log::{DOCUMENT, LogError, LogSection, LogSpec, RawReader, begins_with};
 
 /// What `identify` works on.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Named {
+pub(super) enum IdentifyTarget {
     /// Nothing was named: the built-in campaign.
     BuiltIn,
     Campaign(PathBuf),
@@ -23,7 +23,7 @@ pub(super) fn named(
     files: &[LogSpec],
     (urdf, log): (Option<&Path>, &[LogSpec]),
     context: &Context,
-) -> Result<Named, CliError> {
+) -> Result<IdentifyTarget, CliError> {
     if let ([only], None, []) = (files, urdf, log)
         && let Some(found) = of_example(&only.path, context)?
     {
@@ -35,7 +35,7 @@ pub(super) fn named(
     let mut robots: Vec<PathBuf> = robots.into_iter().map(|file| file.path).collect();
     robots.extend(urdf.map(Path::to_path_buf));
     match (robots.as_slice(), logs.as_slice()) {
-        ([], []) => Ok(Named::BuiltIn),
+        ([], []) => Ok(IdentifyTarget::BuiltIn),
         ([], [first, ..]) => {
             let name = first.name();
             is_a_log(first)?;
@@ -51,9 +51,9 @@ pub(super) fn named(
                     "without a URDF, make a robot file first: cft-ident new NAME --log {name}"
                 )))
         }
-        ([robot], []) if is_toml(robot) => Ok(Named::Campaign(robot.clone())),
+        ([robot], []) if is_toml(robot) => Ok(IdentifyTarget::Campaign(robot.clone())),
         ([robot], []) => Err(without_log(robot)),
-        ([robot], logs) => Ok(Named::Robot(robot.clone(), logs.to_vec())),
+        ([robot], logs) => Ok(IdentifyTarget::Robot(robot.clone(), logs.to_vec())),
         ([first, second, ..], _) => Err(CliError::usage(format!(
             "two robots: {} and {}",
             first.display(),
@@ -84,8 +84,8 @@ fn without_log(robot: &Path) -> CliError {
 }
 
 /// The campaign of a file; a robot file is none.
-pub(super) fn campaign(file: &Path) -> Result<Campaign, CliError> {
-    Campaign::load(file).map_err(|error| match RobotFile::load(file) {
+pub(super) fn campaign(file: &Path) -> Result<CampaignFile, CliError> {
+    CampaignFile::load(file).map_err(|error| match RobotFile::load(file) {
         Ok(_) => without_log(file),
         Err(_) => error.into(),
     })
@@ -107,7 +107,7 @@ fn is_robot(file: &Path) -> bool {
 }
 
 /// The files of an example whose name was given where no file has it.
-fn of_example(name: &Path, context: &Context) -> Result<Option<Named>, CliError> {
+fn of_example(name: &Path, context: &Context) -> Result<Option<IdentifyTarget>, CliError> {
     let word = name.to_str().unwrap_or_default();
     let machine = ExampleMachine::from_str(word, false).ok();
     let Some(machine) = machine.filter(|_| !name.exists() || name.join("README.txt").exists())
@@ -127,8 +127,8 @@ fn of_example(name: &Path, context: &Context) -> Result<Option<Named>, CliError>
     context.files.commit()?;
     Ok(Some(match machine.robot_and_log() {
         Some([robot, log]) => {
-            Named::Robot(folder.join(robot), vec![LogSpec::whole(folder.join(log))])
+            IdentifyTarget::Robot(folder.join(robot), vec![LogSpec::whole(folder.join(log))])
         }
-        None => Named::Campaign(folder.join("campaign.toml")),
+        None => IdentifyTarget::Campaign(folder.join("campaign.toml")),
     }))
 }

@@ -7,11 +7,11 @@ use std::path::Path;
 
 use super::error::{CliError, indented, to_stderr};
 use super::exit::Exit;
-use super::{Destination, colour};
+use super::{DocumentDestination, colour};
 use cft_ident_logs::log::is_hidden;
-use cft_ident_logs::output::Together;
-use cft_ident_report::report::Detail;
-use cft_ident_report::report::json::Document;
+use cft_ident_logs::output::FileBatch;
+use cft_ident_report::report::ReportDetail;
+use cft_ident_report::report::json::JsonDocument;
 
 /// What a command hands back.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub struct Outcome {
     /// Tables for a person, ending in a line end.
     pub text: String,
     /// The same for a script; its warnings are shown on standard error too.
-    pub document: Document,
+    pub document: JsonDocument,
     /// Limits that the user set and the result misses, one sentence each; they make exit status 1.
     pub missed: Vec<String>,
     /// Warnings of the document that do not touch what was asked for.
@@ -28,7 +28,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// A result that misses no limit.
-    pub(super) fn new(text: String, document: Document) -> Self {
+    pub(super) fn new(text: String, document: JsonDocument) -> Self {
         Outcome {
             text,
             document,
@@ -38,9 +38,9 @@ impl Outcome {
     }
 
     /// Names the page that was written, where the text does not yet.
-    pub(super) fn says_where(&mut self, page: &Path, detail: Detail) {
+    pub(super) fn says_where(&mut self, page: &Path, detail: ReportDetail) {
         let page = page.display().to_string();
-        if detail != Detail::Brief && !self.text.contains(&page) {
+        if detail != ReportDetail::Brief && !self.text.contains(&page) {
             self.text += &format!("report: {page}\n");
         }
     }
@@ -54,16 +54,16 @@ const ABOUT_ONE: usize = 2;
 /// Shows an outcome; its status. Files get their names after all else, so that a failure leaves none.
 pub(super) fn show(
     outcome: &Outcome,
-    json: Option<&Destination>,
-    (files, detail): (&Together, Detail),
+    json: Option<&DocumentDestination>,
+    (files, detail): (&FileBatch, ReportDetail),
     stdout: &mut dyn Write,
     stderr: &mut dyn Write,
 ) -> Result<Exit, CliError> {
     match json {
-        Some(Destination::Stdout) => {
+        Some(DocumentDestination::Stdout) => {
             write(stdout, &outcome.document.text()).map_err(|error| no_standard_output(&error))?;
         }
-        Some(Destination::File(path)) => {
+        Some(DocumentDestination::File(path)) => {
             files.write(path, outcome.document.text().as_bytes())?;
             write_for_a_person(stdout, outcome)?;
         }
@@ -81,15 +81,15 @@ pub(super) fn show(
 }
 
 /// Shows the warnings, after the result: they explain it.
-fn warn(outcome: &Outcome, detail: Detail, stderr: &mut dyn Write) {
+fn warn(outcome: &Outcome, detail: ReportDetail, stderr: &mut dyn Write) {
     let aside = |warning: &&str| outcome.asides.iter().any(|text| text == warning);
     let all = outcome.document.warnings();
     let all: Vec<&str> = match detail {
-        Detail::Full => all.collect(),
+        ReportDetail::Full => all.collect(),
         _ => all.filter(|warning| !aside(warning)).collect(),
     };
     let most = match detail {
-        Detail::Full => usize::MAX,
+        ReportDetail::Full => usize::MAX,
         _ => MAX_WARNINGS,
     };
     let (shown, more) = grouped(&all, detail);
@@ -106,7 +106,7 @@ fn warn(outcome: &Outcome, detail: Detail, stderr: &mut dyn Write) {
 }
 
 /// The warnings that are shown, and how many are not: of several about one log or joint the first two.
-fn grouped<'a>(all: &[&'a str], detail: Detail) -> (Vec<&'a str>, usize) {
+fn grouped<'a>(all: &[&'a str], detail: ReportDetail) -> (Vec<&'a str>, usize) {
     // `log.csv: what is wrong with it`
     let about = |warning: &'a str| {
         let (name, _) = warning.split_once(": ")?;
@@ -117,7 +117,7 @@ fn grouped<'a>(all: &[&'a str], detail: Detail) -> (Vec<&'a str>, usize) {
         let same = |warning: &&'a str| about(warning) == name;
         name.map_or(0, |_| all[..k].iter().copied().filter(same).count())
     };
-    let kept = |k: &usize| detail == Detail::Full || before(*k) < ABOUT_ONE;
+    let kept = |k: &usize| detail == ReportDetail::Full || before(*k) < ABOUT_ONE;
     let shown: Vec<&str> = (0..all.len()).filter(kept).map(|k| all[k]).collect();
     let more = all.len() - shown.len();
     (shown, more)
@@ -162,7 +162,7 @@ mod tests {
         let body = json!({"joints": [{"joint": "q1", "rmse": f64::NAN}]});
         Outcome {
             text: "joint  rmse\n".into(),
-            document: Document::new("validate", &[], &warnings, &body).unwrap(),
+            document: JsonDocument::new("validate", &[], &warnings, &body).unwrap(),
             missed: missed.iter().map(|limit| limit.to_string()).collect(),
             asides: Vec::new(),
         }
@@ -171,19 +171,19 @@ mod tests {
     fn to(
         out: &mut dyn Write,
         outcome: &Outcome,
-        json: Option<&Destination>,
-        detail: Detail,
+        json: Option<&DocumentDestination>,
+        detail: ReportDetail,
     ) -> (Result<Exit, CliError>, String) {
         let mut err = Vec::new();
-        let files = Together::default();
+        let files = FileBatch::default();
         let exit = show(outcome, json, (&files, detail), out, &mut err);
         (exit, String::from_utf8(err).unwrap())
     }
 
     #[test]
     fn json_on_standard_output_is_one_document_and_nothing_else() {
-        let (mut out, json) = (Vec::new(), Some(&Destination::Stdout));
-        let (exit, err) = to(&mut out, &outcome(&[]), json, Detail::Usual);
+        let (mut out, json) = (Vec::new(), Some(&DocumentDestination::Stdout));
+        let (exit, err) = to(&mut out, &outcome(&[]), json, ReportDetail::Usual);
         assert_eq!(exit.unwrap(), Exit::Success);
         let document: Value = serde_json::from_slice(&out).unwrap();
         assert_eq!(document["schema"], "cft-ident/validate/1");
@@ -194,9 +194,9 @@ mod tests {
     fn json_in_a_file_leaves_the_tables_on_standard_output() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("result.json");
-        let (mut out, json) = (Vec::new(), Destination::File(path.clone()));
+        let (mut out, json) = (Vec::new(), DocumentDestination::File(path.clone()));
         let missed = outcome(&["q4 1.4 % > 1 %"]);
-        let (exit, err) = to(&mut out, &missed, Some(&json), Detail::Usual);
+        let (exit, err) = to(&mut out, &missed, Some(&json), ReportDetail::Usual);
         assert_eq!(exit.unwrap(), Exit::LimitMissed);
         assert_eq!(out, b"joint  rmse\n");
         let document: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
@@ -207,9 +207,12 @@ mod tests {
     #[test]
     fn many_warnings_do_not_push_the_result_off_the_screen() {
         let warnings: Vec<String> = (0..40).map(|k| format!("gap at {k} s")).collect();
-        let document = Document::new("validate", &[], &warnings, &json!({})).unwrap();
+        let document = JsonDocument::new("validate", &[], &warnings, &json!({})).unwrap();
         let many = Outcome::new("joint  rmse\n".into(), document);
-        for (detail, lines) in [(Detail::Usual, MAX_WARNINGS + 1), (Detail::Full, 40)] {
+        for (detail, lines) in [
+            (ReportDetail::Usual, MAX_WARNINGS + 1),
+            (ReportDetail::Full, 40),
+        ] {
             let (_, err) = to(&mut Vec::new(), &many, None, detail);
             assert_eq!(err.lines().count(), lines);
         }
@@ -219,8 +222,8 @@ mod tests {
     fn of_several_warnings_about_one_log_the_first_two_are_shown() {
         let all = ["a.csv: 1", "b.csv: 1", "a.csv: 2", "a.csv: 3", "in all: 1"];
         let expected = vec!["a.csv: 1", "b.csv: 1", "a.csv: 2", "in all: 1"];
-        assert_eq!(grouped(&all, Detail::Usual), (expected, 1));
-        assert_eq!(grouped(&all, Detail::Full), (all.to_vec(), 0));
+        assert_eq!(grouped(&all, ReportDetail::Usual), (expected, 1));
+        assert_eq!(grouped(&all, ReportDetail::Full), (all.to_vec(), 0));
     }
 
     /// A standard output that fails with the given kind.
@@ -239,10 +242,14 @@ mod tests {
         use io::ErrorKind::{BrokenPipe, StorageFull};
         for (kind, json, expected) in [
             (BrokenPipe, None, Exit::Success),
-            (BrokenPipe, Some(&Destination::Stdout), Exit::OutputFailed),
+            (
+                BrokenPipe,
+                Some(&DocumentDestination::Stdout),
+                Exit::OutputFailed,
+            ),
             (StorageFull, None, Exit::OutputFailed),
         ] {
-            let (found, _) = to(&mut Failing(kind), &outcome(&[]), json, Detail::Usual);
+            let (found, _) = to(&mut Failing(kind), &outcome(&[]), json, ReportDetail::Usual);
             assert_eq!(found.unwrap_or_else(|error| error.exit()), expected);
         }
     }

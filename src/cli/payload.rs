@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, paths_of, written};
 use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
-use cft_ident_report::report::table::{Align, Table};
-use cft_ident_report::report::{Figure, FoundLine, Headline, Report, Tone};
+use cft_ident_report::report::table::{CellAlignment, Table};
+use cft_ident_report::report::{FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline};
 use cft_ident_stages::identify::{
-    self, Dataset, Number95, Payload, PayloadReading, PayloadVerdict,
+    self, Dataset, IntervalNumber, Payload, PayloadReading, PayloadVerdict,
 };
 use cft_ident_tool::tool::{CarriedBody, RobotController};
 
@@ -73,12 +73,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     Ok(Outcome::new(
         report.text_for(context.screen),
-        Document::new("payload", &found.inputs, &found.warnings, &found)?,
+        JsonDocument::new("payload", &found.inputs, &found.warnings, &found)?,
     ))
 }
 
 /// A gain error as percent; nothing is known of one whose interval holds a gain of zero.
-fn gain(x: &Number95) -> String {
+fn gain(x: &IntervalNumber) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) if low > -1.0 => {
             let [value, low, high] = [value, low, high].map(|x| format!("{:+.1}", 100.0 * x));
@@ -89,7 +89,7 @@ fn gain(x: &Number95) -> String {
 }
 
 /// A number with its interval.
-fn shown(x: &Number95) -> String {
+fn shown(x: &IntervalNumber) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
             // digits as far as the interval says something
@@ -110,12 +110,12 @@ fn report(found: &Payload, logs: &str) -> Report {
         let value = reading.map(|of| format!("{} kg", shown(&of.mass)));
         value.unwrap_or(number::ABSENT.to_owned())
     };
-    let figure = |label, value| Figure {
+    let figure = |label, value| VerdictFigure {
         label,
         value,
-        tone: Tone::Plain,
+        tone: FigureTone::Plain,
     };
-    all.headline(Headline {
+    all.headline(VerdictHeadline {
         figures: vec![
             figure("mass", mass(false)),
             figure("with free gains", mass(true)),
@@ -241,14 +241,14 @@ fn tables(found: &Payload, logs: &str) -> [Table; 2] {
         escape(logs)
     );
     let mut table = Table::new(&[
-        ("", Align::Left),
-        ("gains as in the model", Align::Left),
-        ("gain errors free", Align::Left),
-        ("unit", Align::Left),
+        ("", CellAlignment::Left),
+        ("gains as in the model", CellAlignment::Left),
+        ("gain errors free", CellAlignment::Left),
+        ("unit", CellAlignment::Left),
     ])
     .caption(&caption);
     if let [as_given, free] = &found.readings[..] {
-        let mut row = |name: &str, a: &Number95, b: &Number95| {
+        let mut row = |name: &str, a: &IntervalNumber, b: &IntervalNumber| {
             table.row([name, &shown(a), &shown(b), &a.unit]);
         };
         row("mass", &as_given.mass, &free.mass);
@@ -259,11 +259,11 @@ fn tables(found: &Payload, logs: &str) -> [Table; 2] {
         }
     }
     let mut errors = Table::new(&[
-        ("joint", Align::Left),
-        ("error before", Align::Decimal),
-        ("with the body", Align::Decimal),
-        ("and gains", Align::Decimal),
-        ("gain error", Align::Left),
+        ("joint", CellAlignment::Left),
+        ("error before", CellAlignment::Decimal),
+        ("with the body", CellAlignment::Decimal),
+        ("and gains", CellAlignment::Decimal),
+        ("gain error", CellAlignment::Left),
     ]);
     if let [as_given, free] = &found.readings[..] {
         for ((a, b), gain) in as_given.joints.iter().zip(&free.joints).zip(&free.gains) {

@@ -4,9 +4,9 @@ use super::{CliError, Context, Exit, inspect};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::LogSpec;
-use cft_ident_report::report::sections::quality::Inspected;
+use cft_ident_report::report::sections::quality::InspectedLog;
 use cft_ident_stages::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
-use cft_ident_stages::replay::{Replay, Replayed};
+use cft_ident_stages::replay::{LogReplay, ReplayedLogs};
 
 /// Reads logs whole for the pictures of a report; none where they are too long for that.
 pub(super) fn in_memory(
@@ -26,8 +26,8 @@ pub(super) fn replay<'a>(
     machine: &'a LoggedRobot,
     in_memory: Option<&'a InMemory>,
     names: &[String],
-) -> Result<Option<Replay<'a>>, CliError> {
-    let new = |in_memory| Replay::new(machine, in_memory, names.iter().cloned());
+) -> Result<Option<LogReplay<'a>>, CliError> {
+    let new = |in_memory| LogReplay::new(machine, in_memory, names.iter().cloned());
     in_memory.map(new).transpose().map_err(CliError::input)
 }
 
@@ -38,9 +38,9 @@ pub(super) fn replayed(
     names: &[String],
     (file, model): (&ModelFile, &AugmentedModel),
     used: &[bool],
-) -> Result<Option<Replayed>, CliError> {
+) -> Result<Option<ReplayedLogs>, CliError> {
     let replay = replay(machine, in_memory, names)?;
-    let replayed = replay.map(|replay| Replayed::new(&replay, file, model, used));
+    let replayed = replay.map(|replay| ReplayedLogs::new(&replay, file, model, used));
     replayed.transpose().map_err(CliError::input)
 }
 
@@ -49,14 +49,14 @@ pub(super) fn inspected<'a>(
     logs: impl IntoIterator<Item = &'a LogSpec>,
     machine: &LoggedRobot,
     context: &Context,
-) -> Result<Vec<Inspected>, CliError> {
+) -> Result<Vec<InspectedLog>, CliError> {
     let inspected = |spec: &LogSpec| {
         let found = match inspect::findings(spec, machine, context) {
             Err(error) if error.exit() == Exit::Interrupted => return Err(error),
             found => found.map_err(|error| error.message().to_owned()),
         };
         let name = spec.name();
-        Ok(Inspected { name, found })
+        Ok(InspectedLog { name, found })
     };
     logs.into_iter().map(inspected).collect()
 }

@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::{CliError, Context, Outcome, arguments, files, logs, outputs, paths_of, setup};
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::Report;
-use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::table::{CellAlignment, Table};
 use cft_ident_stages::identify::{self, Dataset, FORMAT, LoggedRobot, MadeWith, ReducedLogs};
 use cft_ident_stages::setup::Finding;
 
@@ -46,7 +46,8 @@ pub struct Args {
 
 /// What a file of reduced logs holds.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Reduced {
+#[schemars(rename = "Reduced")]
+pub struct ReducedFile {
     /// Number of the file's format.
     format: u32,
     /// What the logs were reduced with.
@@ -87,7 +88,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let found = identify::reduce(&checked.data, known, &context.control)?;
     context.check()?;
     let bytes = found.to_bytes().map_err(identify::IdentifyError::from)?;
-    let result = Reduced {
+    let result = ReducedFile {
         format: FORMAT,
         made_with: (found.made_with().cloned())
             .ok_or_else(|| CliError::usage("no log is given"))?,
@@ -98,7 +99,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let shown = found.logs().iter().flat_map(|log| log.warnings.clone());
     let warnings: Vec<String> = checked.warnings.iter().cloned().chain(shown).collect();
     let inputs: Vec<Provenance> = found.logs().iter().map(|l| l.provenance.clone()).collect();
-    let document = Document::new("reduce", &inputs, &warnings, &result)?;
+    let document = JsonDocument::new("reduce", &inputs, &warnings, &result)?;
     checked.write(context)?;
     context.files.write(&args.output, &bytes)?;
     Ok(Outcome::new(
@@ -117,13 +118,13 @@ fn in_file(log: &identify::ReducedLog) -> LogInFile {
     }
 }
 
-fn report(found: &ReducedLogs, result: &Reduced, args: &Args) -> Report {
+fn report(found: &ReducedLogs, result: &ReducedFile, args: &Args) -> Report {
     let columns = [
-        ("log", Align::Left),
-        ("samples", Align::Right),
-        ("duration [s]", Align::Decimal),
-        ("rows", Align::Right),
-        ("blocks", Align::Right),
+        ("log", CellAlignment::Left),
+        ("samples", CellAlignment::Right),
+        ("duration [s]", CellAlignment::Decimal),
+        ("rows", CellAlignment::Right),
+        ("blocks", CellAlignment::Right),
     ];
     let mut table = Table::new(&columns).caption("reduced logs");
     for log in found.logs() {

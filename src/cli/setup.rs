@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context};
-use cft_ident_files::config::correction::{Edit, edited};
+use cft_ident_files::config::correction::{KeyEdit, edited};
 use cft_ident_files::config::{self, RobotFile};
 use cft_ident_stages::identify::{CheckedSetup, Dataset, IdentifyError, LoggedRobot, check_setup};
 use cft_ident_stages::setup::{
@@ -21,7 +21,8 @@ pub struct SetupArgs {
     pub as_declared: bool,
 }
 
-pub struct Checked {
+/// Logs whose set-up was checked, with what was found.
+pub struct CheckedDataset {
     /// The robot to go on with, and the logs.
     pub data: Dataset,
     pub report: SetupReport,
@@ -30,7 +31,7 @@ pub struct Checked {
     pub new_file: Option<(PathBuf, String)>,
 }
 
-impl Checked {
+impl CheckedDataset {
     /// Writes the new robot file, where there is one, and says so.
     pub fn write(&self, context: &Context) -> Result<(), CliError> {
         if let Some((path, text)) = &self.new_file {
@@ -44,10 +45,10 @@ impl Checked {
 /// Checks the set-up by the logs; `before` is what the machine has that its file `robot` lacks.
 pub fn checked(
     data: Dataset,
-    (robot, before): (&Path, &[Edit]),
+    (robot, before): (&Path, &[KeyEdit]),
     args: &SetupArgs,
     context: &Context,
-) -> Result<Checked, CliError> {
+) -> Result<CheckedDataset, CliError> {
     let data = match args.as_declared {
         true => Dataset {
             machine: data.machine.as_declared(),
@@ -86,7 +87,7 @@ pub fn checked(
             Some(machine) => Dataset { machine, ..data },
             None => data,
         };
-        return Ok(Checked {
+        return Ok(CheckedDataset {
             data,
             report,
             warnings,
@@ -101,7 +102,7 @@ pub fn checked(
     let right = |f: &&Finding| format!("put right in {}: {}", path.display(), f.in_words());
     warnings.extend(refusals.iter().map(right));
     let machine = LoggedRobot::new(&path.to_string_lossy(), corrected);
-    Ok(Checked {
+    Ok(CheckedDataset {
         data: Dataset { machine, ..data },
         report,
         warnings,
@@ -125,12 +126,12 @@ pub fn report(data: &Dataset, context: &Context) -> Result<SetupReport, CliError
 /// Text of the new robot file: the user's with the lines that differ, else the whole anew.
 fn new_text(
     robot: &Path,
-    edits: &[Edit],
+    edits: &[KeyEdit],
     corrected: &RobotFile,
     path: &Path,
 ) -> Result<String, CliError> {
     // one that was drafted is no file yet
-    let text = config::text_of_kind(robot, config::Wanted::Robot);
+    let text = config::text_of_kind(robot, config::WantedFile::Robot);
     let name = path.to_string_lossy();
     // a URDF is named beside the file
     let folder = path.parent();

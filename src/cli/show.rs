@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{CliError, Context, Outcome, arguments, files, written};
 use cft_ident_files::config::model_file::{EffectSection, Parameter};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{JointInUse, in_use};
@@ -50,7 +50,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let (model, machine) = (given.value.numbers()?, given.value.machine());
     let file = given.value.file;
     let found = in_use(&machine, &file, &model.model);
-    let of = stages::show::Show {
+    let of = stages::show::ShowReport {
         machine: &machine,
         file: &file,
         model: &model,
@@ -76,6 +76,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     Ok(Outcome::new(
         report.text_for(context.screen),
-        Document::new("show", &inputs, &[], &shown)?,
+        JsonDocument::new("show", &inputs, &[], &shown)?,
     ))
 }

@@ -23,8 +23,8 @@ use cft_ident_plant::simulate::servo::BenchMotion;
 use cft_ident_plant::simulate::{
     self, EffectSpec, Experiment, InitialConditions, LimitEvent, Order, RunEnding,
 };
-use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::table::{CellAlignment, Table};
 
 const EXAMPLE: &str = "\
 Example:
@@ -212,7 +212,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let shown = [robot.notes.0.clone(), warnings(&simulated)].concat();
     let all = render(&robot, &log, &names.0);
     let text = context.text(all, &format!("written: {}", names.0));
-    let document = Document::new("simulate", &inputs, &shown, &result)?;
+    let document = JsonDocument::new("simulate", &inputs, &shown, &result)?;
     Ok(Outcome::new(text, document))
 }
 
@@ -388,7 +388,7 @@ pub struct SimulationResult<'a> {
     ending: RunEnding,
     limits_reached: &'a [LimitEvent],
     saturated: Vec<Saturation<'a>>,
-    files: Files<'a>,
+    files: SimulatedFiles<'a>,
 }
 
 /// How often an amplifier saturates.
@@ -401,7 +401,8 @@ struct Saturation<'a> {
 
 /// Names of what was written.
 #[derive(Debug, Serialize, JsonSchema)]
-struct Files<'a> {
+#[schemars(rename = "Files")]
+struct SimulatedFiles<'a> {
     log: &'a str,
     truth: &'a str,
 }
@@ -427,7 +428,7 @@ impl<'a> SimulationResult<'a> {
             ending: log.ending,
             limits_reached: &log.limits,
             saturated: saturated.collect(),
-            files: Files { log: name, truth },
+            files: SimulatedFiles { log: name, truth },
         }
     }
 }
@@ -454,11 +455,11 @@ pub(super) fn warnings(simulated: &simulate::SimulationSummary) -> Vec<String> {
 /// Range and root mean square of every channel of the log.
 fn render(robot: &RobotFile, figures: &LogFigures, log: &str) -> String {
     let mut table = Table::new(&[
-        ("column", Align::Left),
-        ("from", Align::Decimal),
-        ("to", Align::Decimal),
-        ("rms", Align::Decimal),
-        ("unit", Align::Left),
+        ("column", CellAlignment::Left),
+        ("from", CellAlignment::Decimal),
+        ("to", CellAlignment::Decimal),
+        ("rms", CellAlignment::Decimal),
+        ("unit", CellAlignment::Left),
     ])
     .caption(&format!(
         "{log}: {} samples, {} s",

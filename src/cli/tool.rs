@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{CliError, Context, Outcome, arguments, paths_of, written};
 use cft_ident_core::explain::Explain;
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
 use cft_ident_tool::tool::{ForceUnit, ToolError, ToolFile, WrenchRequest, analyse, read_wrenches};
 
@@ -114,6 +114,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_text(page, &report.html())?;
     }
     written(&mut report, &args.output);
-    let document = Document::new("tool", &inputs, &warnings, &found)?;
+    let document = JsonDocument::new("tool", &inputs, &warnings, &found)?;
     Ok(Outcome::new(report.text_for(context.screen), document))
 }

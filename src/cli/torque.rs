@@ -10,9 +10,9 @@ use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_plant::excite::{self, ExciteError, Motion};
 use cft_ident_report::report::Report;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::table::{CellAlignment, Table};
 use cft_ident_stages::identify::{self, Log};
 
 const EXAMPLE: &str = "\
@@ -116,10 +116,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         return Err(error.into());
     }
     let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("rms", Align::Decimal),
-        ("peak", Align::Decimal),
-        ("unit", Align::Left),
+        ("joint", CellAlignment::Left),
+        ("rms", CellAlignment::Decimal),
+        ("peak", CellAlignment::Decimal),
+        ("unit", CellAlignment::Left),
     ])
     .caption(&format!("torque of {} along {}", name, args.log.name()));
     for joint in &found.along.joints {
@@ -132,7 +132,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let mut inputs = found.inputs.clone();
     inputs.splice(0..0, trajectory);
-    let document = Document::new("torque", &inputs, &found.warnings, &found.along)?;
+    let document = JsonDocument::new("torque", &inputs, &found.warnings, &found.along)?;
     context.files.add_log(out)?;
     let mut report = Report::new(&format!("Torque along {}", escape(&args.log.name())));
     report.everywhere().table(table);

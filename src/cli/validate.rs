@@ -7,12 +7,12 @@ use super::{
     pictures, typed, written,
 };
 use cft_ident_core::number;
-use cft_ident_core::validate::{JointError, Reconstructed, TorqueErrors};
+use cft_ident_core::validate::{JointError, ReconstructedRow, TorqueErrors};
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::table::{CellAlignment, Table};
 use cft_ident_stages::identify::{self, Dataset, Log, ValidateSettings};
 use cft_ident_stages::open_loop::OpenLoop;
 
@@ -69,7 +69,7 @@ pub fn missed(errors: &TorqueErrors, limit: Option<f64>) -> Vec<String> {
     errors.joints.iter().filter(above).map(words).collect()
 }
 
-fn residual_row(r: &Reconstructed, band: bool) -> impl Iterator<Item = f64> {
+fn residual_row(r: &ReconstructedRow, band: bool) -> impl Iterator<Item = f64> {
     let residual = r.measured.iter().zip(r.reconstructed).map(|(a, b)| a - b);
     let torques = r.measured.iter().chain(r.reconstructed).copied();
     let limits = |sign: f64| {
@@ -83,12 +83,12 @@ fn residual_row(r: &Reconstructed, band: bool) -> impl Iterator<Item = f64> {
 
 fn drifts(found: &OpenLoop) -> String {
     let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("rms", Align::Decimal),
-        ("at the end", Align::Decimal),
-        ("largest", Align::Decimal),
-        ("of the motion", Align::Decimal),
-        ("unit", Align::Left),
+        ("joint", CellAlignment::Left),
+        ("rms", CellAlignment::Decimal),
+        ("at the end", CellAlignment::Decimal),
+        ("largest", CellAlignment::Decimal),
+        ("of the motion", CellAlignment::Decimal),
+        ("unit", CellAlignment::Left),
     ])
     .caption(&match found.window_s {
         Some(s) => format!(
@@ -157,7 +157,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         return Err(error.into());
     }
     let names = names_of(&args.logs);
-    let document = Document::new("validate", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("validate", &found.inputs, &found.warnings, &found)?;
     let model_path = typed::quoted(&args.model.to_string_lossy());
     let unseen = args
         .logs
@@ -168,7 +168,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .map(|log| format!(" --holdout {}", typed::quoted(&log.to_string())))
         .collect();
     let next = format!("cft-ident diagnose LOG -m {model_path}{unseen}");
-    let of = stages::validate::Validate {
+    let of = stages::validate::ValidateReport {
         machine: &machine,
         file,
         model: &model,

@@ -9,11 +9,11 @@ use super::{CliError, Context, Outcome, arguments, columns_of, files, logs_of, p
 use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
-use cft_ident_report::report::table::{Align, Table};
-use cft_ident_report::report::{Figure, Headline, Report, Tone};
-use cft_ident_stages::identify::{self, Log, STREAM, WatchLine, WatchSettings, Watchable, Watched};
+use cft_ident_report::report::table::{CellAlignment, Table};
+use cft_ident_report::report::{FigureTone, Report, VerdictFigure, VerdictHeadline};
+use cft_ident_stages::identify::{self, Log, RowSource, STREAM, WatchLine, WatchSettings, Watched};
 
 const EXAMPLE: &str = "\
 Example:
@@ -49,15 +49,17 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
-enum Sink {
-    Lines(Lines),
+/// Where rows that were watched are written.
+enum WatchSink {
+    Lines(JsonLines),
     /// A line an alarm, and where the watch stands.
-    People(People),
+    People(TerminalLines),
     File(Box<LogWriter>),
     None,
 }
 
-struct People {
+/// Lines for a person at a terminal, as alarms come.
+struct TerminalLines {
     /// Whether an alarm is on.
     on: bool,
     alarms: u64,
@@ -69,7 +71,7 @@ struct People {
 /// Rows between two looks at the status line.
 const STATUS: u64 = 200;
 
-impl People {
+impl TerminalLines {
     fn take(&mut self, line: &WatchLine) {
         let t = line.origin.seconds() + line.t;
         self.rows += 1;
@@ -97,7 +99,7 @@ impl People {
 }
 
 /// JSON lines on standard output.
-struct Lines {
+struct JsonLines {
     out: BufWriter<io::Stdout>,
     /// Joint names as JSON strings.
     joints: Vec<String>,
@@ -105,7 +107,7 @@ struct Lines {
     at_once: bool,
 }
 
-impl Lines {
+impl JsonLines {
     fn write(&mut self, line: &WatchLine) -> io::Result<()> {
         let origin = line.origin.seconds();
         let torques = line.external.iter().zip(line.std);
@@ -152,10 +154,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         Some(path) => {
             let mut columns = columns_of(&["external", "external_std"], &joints);
             columns.push("alarm".to_owned());
-            Sink::File(Box::new(LogWriter::create(path, &columns)?))
+            WatchSink::File(Box::new(LogWriter::create(path, &columns)?))
         }
-        None if context.prints_document => Sink::None,
-        None if io::stdout().is_terminal() => Sink::People(People {
+        None if context.prints_document => WatchSink::None,
+        None if io::stdout().is_terminal() => WatchSink::People(TerminalLines {
             on: false,
             alarms: 0,
             rows: 0,
@@ -164,15 +166,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 .map(|(j, joint)| (joint.clone(), robot.torque_unit(j)))
                 .collect(),
         }),
-        None => Sink::Lines(Lines {
+        None => WatchSink::Lines(JsonLines {
             out: BufWriter::new(io::stdout()),
             joints: joints.iter().map(|j| in_json(j)).collect(),
             at_once: of_stream,
         }),
     };
     let input = match of_stream {
-        true => Watchable::Stream(Box::new(io::stdin())),
-        false => Watchable::Log(Log::from(&args.log)),
+        true => RowSource::Stream(Box::new(io::stdin())),
+        false => RowSource::Log(Log::from(&args.log)),
     };
     let unloaded = logs_of(&args.unloaded);
     let settings = WatchSettings {
@@ -205,40 +207,40 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         written(&mut report, path);
     }
     let text = report.text_for(context.screen);
-    let document = Document::new("watch", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("watch", &found.inputs, &found.warnings, &found)?;
     if let Some(error) = found.error.take() {
         let error = CliError::from(error).hint("the results before it are printed above");
         context.end_with(error);
     }
     let text = match sink {
-        Sink::File(log) => {
+        WatchSink::File(log) => {
             context.files.add_log(*log)?;
             let path = args.output.as_deref().unwrap_or(Path::new(""));
             format!("{text}written: {}\n", path.display())
         }
-        Sink::Lines(mut lines) => {
+        WatchSink::Lines(mut lines) => {
             // a reader that has seen enough is no error
             let _ = lines.out.flush();
             text.trim_end().lines().for_each(|line| context.note(line));
             String::new()
         }
-        Sink::None | Sink::People(_) => text,
+        WatchSink::None | WatchSink::People(_) => text,
     };
     Ok(Outcome::new(text, document))
 }
 
 /// Writes what a row shows; whether anybody reads on.
-fn put(sink: &mut Sink, line: &WatchLine) -> Result<bool, CliError> {
+fn put(sink: &mut WatchSink, line: &WatchLine) -> Result<bool, CliError> {
     match sink {
-        Sink::None => {}
-        Sink::People(people) => people.take(line),
-        Sink::File(log) => {
+        WatchSink::None => {}
+        WatchSink::People(people) => people.take(line),
+        WatchSink::File(log) => {
             log.set_origin(line.origin);
             let alarm = f64::from(u8::from(line.alarm.is_some()));
             let values = line.external.iter().chain(line.std).copied();
             log.row(std::iter::once(line.t).chain(values).chain([alarm]))?;
         }
-        Sink::Lines(lines) => match lines.write(line) {
+        WatchSink::Lines(lines) => match lines.write(line) {
             Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(false),
             written => written.map_err(|error| no_standard_output(&error))?,
         },
@@ -253,10 +255,10 @@ const MAX_ALARMS: usize = 20;
 fn report(found: &Watched, log: &str) -> Report {
     let mut report = Report::new(&format!("External torques of {}", escape(log)));
     let mut all = report.everywhere();
-    let figure = |label, value| Figure {
+    let figure = |label, value| VerdictFigure {
         label,
         value,
-        tone: Tone::Plain,
+        tone: FigureTone::Plain,
     };
     let mut figures = vec![
         figure("alarms", found.alarms.len().to_string()),
@@ -265,7 +267,7 @@ fn report(found: &Watched, log: &str) -> Report {
     if let Some(delay) = found.delay_s {
         figures.push(figure("delay", format!("{:.1} ms", 1e3 * delay)));
     }
-    all.headline(Headline {
+    all.headline(VerdictHeadline {
         figures,
         of: format!("{} rows, {:.1} s", found.samples, found.duration_s),
     });
@@ -305,11 +307,11 @@ fn report(found: &Watched, log: &str) -> Report {
 
 fn thresholds(found: &Watched) -> Table {
     let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("threshold", Align::Left),
-        ("unit", Align::Left),
-        ("force [N]", Align::Decimal),
-        ("", Align::Left),
+        ("joint", CellAlignment::Left),
+        ("threshold", CellAlignment::Left),
+        ("unit", CellAlignment::Left),
+        ("force [N]", CellAlignment::Decimal),
+        ("", CellAlignment::Left),
     ])
     .caption(&format!(
         "thresholds for {} false alarms an hour, from slow to fast; smallest detectable force at the {}",

@@ -10,7 +10,7 @@ fn tool() -> Command {
 }
 
 fn commands() -> Vec<String> {
-    cft_ident::cli::Cli::command()
+    cft_ident::cli::CommandLine::command()
         .get_subcommands()
         .map(|command| command.get_name().to_owned())
         .collect()

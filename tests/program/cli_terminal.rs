@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use assert_cmd::Command;
-use cft_ident::cli::Cli;
+use cft_ident::cli::CommandLine;
 use clap::{CommandFactory, Parser};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
@@ -290,10 +290,10 @@ fn the_examples_of_every_help_work_where_the_campaign_was_run() {
         tool(folder.path(), &line).assert().code(0);
     }
     let (mut run, mut parsed) = (0, BTreeSet::new());
-    for command in Cli::command().get_subcommands() {
+    for command in CommandLine::command().get_subcommands() {
         for example in examples(command.get_name()) {
             let words: Vec<&str> = example.split_whitespace().collect();
-            let found = Cli::try_parse_from(&words);
+            let found = CommandLine::try_parse_from(&words);
             assert!(found.is_ok(), "{example}: {}", found.unwrap_err());
             let own = |word: &&str| READERS_OWN.contains(word) || word.starts_with('~');
             // the campaign itself is what the others run on

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use cft_ident::cli::generate::schema::{Kind, schema};
+use cft_ident::cli::generate::schema::{SchemaKind, schema};
 use predicates::str::{contains, is_empty};
 use schema_support::wrong;
 use serde_json::Value;
@@ -97,7 +97,7 @@ fn json(folder: &Path, line: &str) -> Value {
 #[test]
 fn the_document_has_its_schema_with_logs_and_without() {
     let folder = bench();
-    let schema = schema(Kind::Compare);
+    let schema = schema(SchemaKind::Compare);
     for line in ["compare a.toml b.toml", "compare a.toml b.toml log.csv"] {
         let shown = json(folder.path(), line);
         assert_eq!(wrong(&shown, &schema, &schema, ""), None, "{line}");

@@ -6,9 +6,9 @@ use crate::export_support;
 
 use cft_ident::config::RobotFile;
 use cft_ident::effect::as_code::no_torque;
-use cft_ident::effect::formula::{Definition, Shape};
+use cft_ident::effect::formula::{FormulaDefinition, FormulaShape};
 use cft_ident::effect::own;
-use cft_ident::effect::{self, Added, AugmentedModel, FAULTS, LAWS, Law, Place};
+use cft_ident::effect::{self, AugmentedModel, EffectPlace, FAULTS, LAWS, Law, ModelEffect};
 use cft_ident::export::{self, Program};
 use cft_ident::identify::{Control, Log, LoggedRobot, read_whole};
 use cft_ident::robot::Robot;
@@ -52,10 +52,10 @@ fn shape(key: &str, i: usize) -> f64 {
 }
 
 /// Curves over every signal at one joint.
-fn curves(robot: &Robot) -> Vec<Added> {
+fn curves(robot: &Robot) -> Vec<ModelEffect> {
     let law = effect::law(robot, "empirical").unwrap();
     let of = |signal: u8| {
-        let mut curve = some(law, Place::Joint(1));
+        let mut curve = some(law, EffectPlace::Joint(1));
         curve.shape[0] = f64::from(signal);
         curve
     };
@@ -63,19 +63,19 @@ fn curves(robot: &Robot) -> Vec<Added> {
 }
 
 /// An effect of the catalogue with numbers of its own.
-fn some(law: &'static Law, place: Place) -> Added {
+fn some(law: &'static Law, place: EffectPlace) -> ModelEffect {
     let keys = law.shape.iter().enumerate();
     let shape = keys.map(|(i, key)| shape(key, i)).collect();
     let linear = (0..law.linear.len()).map(|i| 0.7 + 0.31 * i as f64);
-    Added::new(law, place, shape, linear.collect())
+    ModelEffect::new(law, place, shape, linear.collect())
 }
 
 /// One of each kind of place.
-fn kinds(places: Vec<Place>) -> Vec<Place> {
-    let mut out: Vec<Place> = Vec::new();
+fn kinds(places: Vec<EffectPlace>) -> Vec<EffectPlace> {
+    let mut out: Vec<EffectPlace> = Vec::new();
     for place in places.into_iter().rev() {
-        let alike = |p: &Place| std::mem::discriminant(p) == std::mem::discriminant(&place);
-        if !out.iter().any(alike) || matches!(place, Place::Actuator(_)) {
+        let alike = |p: &EffectPlace| std::mem::discriminant(p) == std::mem::discriminant(&place);
+        if !out.iter().any(alike) || matches!(place, EffectPlace::Actuator(_)) {
             out.push(place);
         }
     }
@@ -95,7 +95,7 @@ fn catalogue() -> Vec<Case> {
                 let effect = some(law, place);
                 all.push(effect.clone());
                 // once is enough for what sits at a joint of any robot
-                if *tried && matches!(place, Place::Joint(_)) {
+                if *tried && matches!(place, EffectPlace::Joint(_)) {
                     continue;
                 }
                 cases.push(Case {
@@ -148,7 +148,7 @@ fn every_effect_of_the_catalogue_is_the_tools_own_in_rust() {
 /// Laws that drive: below zero at rest or at speed, or by an effect.
 fn driving() -> Vec<Case> {
     let robot = parsed("[robot]\nmodel = \"single-joint\"\njoint = \"x\"\nkind = \"prismatic\"\n");
-    let of = |viscous, coulomb, effects: Vec<Added>| {
+    let of = |viscous, coulomb, effects: Vec<ModelEffect>| {
         let mut model = model(robot.clone());
         model.friction = vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
             viscous,
@@ -219,7 +219,7 @@ fn shared(file: &str) -> Option<PathBuf> {
 }
 
 /// The motion of a measured log, smoothed as the robot file says, with effects by hand.
-fn measured(config: &str, log: &str, effects: &dyn Fn(&Robot) -> Vec<Added>) -> Vec<Case> {
+fn measured(config: &str, log: &str, effects: &dyn Fn(&Robot) -> Vec<ModelEffect>) -> Vec<Case> {
     let Some(path) = shared(log) else {
         return Vec::new();
     };
@@ -244,7 +244,7 @@ fn measured(config: &str, log: &str, effects: &dyn Fn(&Robot) -> Vec<Added>) -> 
 
 /// Effects of the size that the diagnosis of the UR10 finds, with friction that takes power at every speed, and a delay,
 /// which the code leaves to the caller.
-fn of_ur10(robot: &Robot) -> Vec<Added> {
+fn of_ur10(robot: &Robot) -> Vec<ModelEffect> {
     let of = |name, joint, numbers: &[(&str, f64)]| named(robot, name, Some(joint), numbers);
     vec![
         of("delay", "q3", &[("d", 0.004)]),
@@ -280,7 +280,7 @@ fn of_ur10(robot: &Robot) -> Vec<Added> {
     ]
 }
 
-fn of_emps(robot: &Robot) -> Vec<Added> {
+fn of_emps(robot: &Robot) -> Vec<ModelEffect> {
     let joint = robot.joint_names()[0].clone();
     let of = |name, numbers: &[(&str, f64)]| named(robot, name, Some(&joint), numbers);
     vec![

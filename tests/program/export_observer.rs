@@ -7,7 +7,7 @@ use assert_cmd::Command as Tool;
 use cft_ident::config::model_file::{EffectParameter, EffectSection};
 use cft_ident::export::{self, Program};
 use cft_ident::identify::{
-    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, WatchSettings, Watchable, lsq,
+    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, RowSource, WatchSettings, lsq,
     watch, watch_recipe,
 };
 use export_support::{note, run, there};
@@ -77,7 +77,7 @@ fn case(given: &GivenModel, unseen: &[[[f64; N]; 2]]) -> Case {
         lines.push((line.t, of(line.external), of(line.std)));
         true
     };
-    let input = Watchable::Log(log("unseen", unseen));
+    let input = RowSource::Log(log("unseen", unseen));
     let found = watch(given, input, &settings, &control, &mut take).unwrap();
     let recipe = watch_recipe(given, STEP, PER_HOUR).unwrap();
     assert!((found.delay_s.unwrap() - recipe.delay_s).abs() < 1e-9);

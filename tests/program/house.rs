@@ -225,7 +225,15 @@ fn estimators_know_nothing_of_the_simulator() {
 
 #[test]
 fn simulator_and_estimator_share_entries_of_effects_and_no_law() {
-    let shared = ["Entry", "Key", "Place", "Places", "Range", "Role", "Unit"];
+    let shared = [
+        "Entry",
+        "Key",
+        "EffectPlace",
+        "PlaceRule",
+        "Range",
+        "Role",
+        "Unit",
+    ];
     for source in sources() {
         if source.room() != Some("simulate") {
             continue;

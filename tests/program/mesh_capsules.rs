@@ -9,7 +9,7 @@ use assert_cmd::Command;
 use cft_ident::config::limits::CapsuleSection;
 use cft_ident::config::{RobotFile, vertices_of_mesh};
 use cft_ident::robot::tree::capsule::of_pieces;
-use cft_ident::robot::tree::enclosing::{Ball, enclosing};
+use cft_ident::robot::tree::enclosing::{BoundingBall, enclosing};
 use cft_ident::robot::tree::space::{UNTURNED, Vector, about, add, turn};
 use predicates::str::contains;
 use rand::{RngExt, SeedableRng};
@@ -308,7 +308,7 @@ fn no_bytes_of_a_mesh_panic_and_what_is_read_is_held() {
             continue;
         };
         read[case % 2] += 1;
-        let balls: Vec<Ball> = vertices.iter().map(|x| (*x, 0.0)).collect();
+        let balls: Vec<BoundingBall> = vertices.iter().map(|x| (*x, 0.0)).collect();
         let (ends, radius) = enclosing(&balls, &UNTURNED).expect("a mesh has a vertex");
         let largest = vertices
             .iter()

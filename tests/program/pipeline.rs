@@ -7,13 +7,13 @@ use std::process::Command;
 
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
-use cft_ident::inertia::solve::{Fit, Weighting, fit};
+use cft_ident::inertia::solve::{Fit, RowWeighting, fit};
 use cft_ident::log::Block;
 use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::Robot;
-use cft_ident::robot::cft::{Setup, Structure};
+use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use cft_ident::simulate::cft::{excitation, follow};
-use cft_ident::simulate::{CftTruth, Sensors, Settings, SimulatedRun};
+use cft_ident::simulate::{CftTruth, PlantSensors, Settings, SimulatedRun};
 
 fn source(block: &Block) -> impl FnMut(&mut Block) -> Result<bool, Infallible> + '_ {
     move |out| {
@@ -51,16 +51,16 @@ fn fitted(robot: &Robot, truth: &CftTruth, recording: &SimulatedRun<4>) -> Fit {
         ..Processing::default()
     };
     let (sums, _) = accumulate(robot, &columns, &processing, &mut source(&log)).unwrap();
-    fit(&sums, Weighting::Wls).unwrap()
+    fit(&sums, RowWeighting::Wls).unwrap()
 }
 
 #[test]
 fn noise_free_data_give_theta_within_a_thousandth() {
-    let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let mut settings = Settings::new(30.0);
-    settings.sensors = Sensors::perfect();
-    let recording = follow(&truth, &[], excitation(Setup::Tuedacs), &settings).unwrap();
+    settings.sensors = PlantSensors::perfect();
+    let recording = follow(&truth, &[], excitation(LaboratorySetup::Tuedacs), &settings).unwrap();
     let fit = fitted(&robot, &truth, &recording);
     assert_eq!(fit.rank, 12);
     for i in 0..12 {
@@ -84,7 +84,7 @@ fn noise_free_data_give_theta_within_a_thousandth() {
 
 #[test]
 fn without_acceleration_of_q1_theta_1_is_lost_and_named() {
-    let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+    let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
     let mut chance = 7u64;
     let mut uniform = move || {
         chance ^= chance << 13;
@@ -99,13 +99,13 @@ fn without_acceleration_of_q1_theta_1_is_lost_and_named() {
         known: vec![None; 4],
         rest_speed: Vec::new(),
     };
-    let mut sums = cft_ident::inertia::accumulate::Accumulator::new(columns.clone(), 0.25);
+    let mut sums = cft_ident::inertia::accumulate::RowAccumulator::new(columns.clone(), 0.25);
     let mut channels = vec![0.0; columns.channels()];
     for k in 0..400 {
         let q = [0.3, uniform(), 0.3 + 0.5 * uniform(), 1.5 + 0.5 * uniform()];
         let v = [0.0, uniform(), uniform(), uniform()];
         let a = [0.0, uniform(), uniform(), uniform()];
-        let theta = CftTruth::synthetic(Setup::Tuedacs).printed();
+        let theta = CftTruth::synthetic(LaboratorySetup::Tuedacs).printed();
         let mut y = [0.0; 48];
         robot.regressor(&q, &v, &a, &mut y);
         let tau: Vec<f64> = (0..4)
@@ -114,12 +114,12 @@ fn without_acceleration_of_q1_theta_1_is_lost_and_named() {
         columns.fill(&robot, &q, &v, &a, &tau, &mut channels);
         sums.add(0, f64::from(k) * 0.01, &channels);
     }
-    let fit = fit(&sums.finish(), Weighting::Wls).unwrap();
+    let fit = fit(&sums.finish(), RowWeighting::Wls).unwrap();
     assert_eq!(fit.rank, 11);
     assert!(!fit.determined[0]);
     assert_eq!(fit.confounded.len(), 1);
     assert_eq!(fit.confounded[0].terms[0].0, 0);
-    let truth = CftTruth::synthetic(Setup::Tuedacs).printed();
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs).printed();
     for (found, truth) in fit.theta.iter().zip(&truth).skip(1) {
         assert!((found - truth).abs() < 1e-9 * truth.abs().max(1.0));
     }

@@ -10,8 +10,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use altered_log::Log;
-use cft_ident::inspect::{Depth, FaultKind, Findings, Gate, InspectedChannel, LogFault, LogJudge};
-use cft_ident::log::{Arrays, Block, Layout, LogSpec, Reader, RowFault};
+use cft_ident::inspect::{
+    FaultKind, InspectedChannel, InspectionDepth, InspectionGate, LogFault, LogFindings, LogJudge,
+};
+use cft_ident::log::{Block, Layout, LogArrays, LogSpec, Reader, RowFault};
 use cft_ident::simulate::Experiment;
 use measured_support::{run, shared};
 
@@ -84,7 +86,7 @@ impl Rows {
     }
 
     /// What the detectors say of it.
-    fn judged(&self, depth: Depth) -> Findings {
+    fn judged(&self, depth: InspectionDepth) -> LogFindings {
         let names = (0..self.joints()).map(|j| format!("q_{j}"));
         let names = names.chain((0..self.joints()).map(|j| format!("tau_{j}")));
         let channels = names.map(|name| InspectedChannel::guessed(&name)).collect();
@@ -99,22 +101,22 @@ impl Rows {
     }
 
     /// The same as a log in memory.
-    fn arrays(&self) -> (Arc<Arrays>, Layout) {
+    fn arrays(&self) -> (Arc<LogArrays>, Layout) {
         let by_rows = |columns: &[Vec<f64>]| -> Vec<f64> {
             let rows = 0..self.t.len();
             rows.flat_map(|k| columns.iter().map(move |column| column[k]))
                 .collect()
         };
         let (q, tau) = (by_rows(&self.q), by_rows(&self.tau));
-        let arrays = Arrays::new(&self.name, self.t.clone(), q, tau).unwrap();
+        let arrays = LogArrays::new(&self.name, self.t.clone(), q, tau).unwrap();
         let joints: Vec<String> = (0..self.joints()).map(|j| j.to_string()).collect();
         (Arc::new(arrays), Layout::joint_columns(&joints))
     }
 
-    fn gate(&self, keep: &[RowFault]) -> Gate {
+    fn gate(&self, keep: &[RowFault]) -> InspectionGate {
         let (arrays, layout) = self.arrays();
         let open = || Reader::of_arrays(&arrays, layout.clone());
-        let found = Gate::look(&open, keep, &|| false, &mut |_, _| {});
+        let found = InspectionGate::look(&open, keep, &|| false, &mut |_, _| {});
         found.unwrap().unwrap()
     }
 
@@ -169,14 +171,14 @@ fn all() -> Vec<Rows> {
     measured.into_iter().flatten().chain(simulated).collect()
 }
 
-fn of_kind(found: &Findings, kind: FaultKind) -> Vec<&LogFault> {
+fn of_kind(found: &LogFindings, kind: FaultKind) -> Vec<&LogFault> {
     found.faults.iter().filter(|f| f.kind == kind).collect()
 }
 
 #[test]
 fn a_position_that_steps_is_named_with_its_joint_and_its_time_and_the_log_is_parted_there() {
     for log in all() {
-        let plain = log.judged(Depth::Gate);
+        let plain = log.judged(InspectionDepth::Gate);
         for joint in 0..log.joints() {
             for size in [0.001f64, -0.01, 0.1] {
                 // A clock that repeats samples, and coarse encoders, hide what is smaller: there one row
@@ -194,7 +196,7 @@ fn a_position_that_steps_is_named_with_its_joint_and_its_time_and_the_log_is_par
                 stepped.q[joint][row..]
                     .iter_mut()
                     .for_each(|q| *q += height);
-                let found = stepped.judged(Depth::Gate);
+                let found = stepped.judged(InspectionDepth::Gate);
                 let what = format!("{} q_{joint} {size}", log.name);
                 let steps = of_kind(&found, FaultKind::PositionStep);
                 assert_eq!(steps.len(), 1, "{what}: {:?}", found.faults);
@@ -222,7 +224,7 @@ fn what_the_robot_file_keeps_is_reported_but_not_acted_upon() {
     let mut log = Rows::simulated(Experiment::Usual);
     let row = log.middle();
     log.q[2][row..].iter_mut().for_each(|q| *q += 0.01);
-    let costs = |gate: &Gate| {
+    let costs = |gate: &InspectionGate| {
         gate.costs()
             .iter()
             .map(|cost| cost.kind)
@@ -254,7 +256,7 @@ fn an_encoder_that_begins_anew_is_named_with_its_range_and_followed_through_its_
             for q in &mut wrapped.q[joint] {
                 *q = (*q - middle).rem_euclid(turn);
             }
-            let found = wrapped.judged(Depth::Gate);
+            let found = wrapped.judged(InspectionDepth::Gate);
             let what = format!("{} q_{joint}", log.name);
             let shown = of_kind(&found, FaultKind::WrappedEncoder);
             assert_eq!(shown.len(), 1, "{what}: {:?}", found.faults);
@@ -318,7 +320,7 @@ fn of_samples_that_are_held_only_fresh_rows_are_used() {
                 }
             }
             let what = format!("{} held for {hold}", log.name);
-            let found = held.judged(Depth::Whole);
+            let found = held.judged(InspectionDepth::Whole);
             let shown = of_kind(&found, FaultKind::SampleAndHold);
             assert_eq!(shown.len(), 1, "{what}: {:?}", found.faults);
             let gate = held.gate(&[]);
@@ -362,7 +364,7 @@ fn stretches_in_which_everything_is_frozen_are_stalls_and_left_out() {
             }
             expected.push((log.t[k], log.t[k + rows - 1]));
         }
-        let found = frozen.judged(Depth::Gate);
+        let found = frozen.judged(InspectionDepth::Gate);
         let shown: Vec<(f64, f64)> = of_kind(&found, FaultKind::Stall)
             .iter()
             .map(|f| (f.log_from_s, f.log_to_s))

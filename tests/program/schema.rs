@@ -3,13 +3,13 @@
 
 use crate::schema_support;
 
-use cft_ident::cli::generate::schema::{Kind, schema};
+use cft_ident::cli::generate::schema::{SchemaKind, schema};
 use cft_ident::config::EMBEDDED;
 use schema_support::wrong;
 use serde_json::Value;
 use std::path::Path;
 
-fn judged(text: &str, kind: Kind) -> Option<String> {
+fn judged(text: &str, kind: SchemaKind) -> Option<String> {
     let value: toml::Value = toml::from_str(text).unwrap();
     let value = serde_json::to_value(value).unwrap();
     let schema = schema(kind);
@@ -20,9 +20,9 @@ fn judged(text: &str, kind: Kind) -> Option<String> {
 fn every_file_that_comes_with_the_tool_has_its_schema() {
     for (name, text) in EMBEDDED {
         let kind = match text {
-            text if text.contains("[robot]") => Kind::Robot,
-            text if text.contains("kind = ") => Kind::Trajectory,
-            _ => Kind::Campaign,
+            text if text.contains("[robot]") => SchemaKind::Robot,
+            text if text.contains("kind = ") => SchemaKind::Trajectory,
+            _ => SchemaKind::Campaign,
         };
         let found = judged(text, kind);
         assert_eq!(found, None, "{name} as {kind:?}");
@@ -32,21 +32,21 @@ fn every_file_that_comes_with_the_tool_has_its_schema() {
 #[test]
 fn what_the_reader_refuses_the_schema_refuses_too() {
     let head = "[robot]\nmodel = \"single-joint\"\njoint = \"q1\"\nkind = \"revolute\"\n";
-    assert_eq!(judged(head, Kind::Robot), None);
+    assert_eq!(judged(head, SchemaKind::Robot), None);
     for more in [
         "colour = 1\n",
         "[filter]\ncutoff_hz = \"ten\"\n",
         "[filter]\nkind = \"magic\"\n",
         "[log.joint.q1]\nposition = true\n",
     ] {
-        let found = judged(&format!("{head}{more}"), Kind::Robot);
+        let found = judged(&format!("{head}{more}"), SchemaKind::Robot);
         assert!(found.is_some(), "{more}");
     }
     // a column by its number is right
     assert_eq!(
         judged(
             &format!("{head}[log.joint.q1]\nposition = 2\n"),
-            Kind::Robot
+            SchemaKind::Robot
         ),
         None
     );
@@ -63,11 +63,11 @@ fn committed_results_have_the_schema_of_their_command() {
         }
         let value: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
         let kind = match value["schema"].as_str() {
-            Some("cft-ident/friction/1") => Kind::Friction,
-            Some("cft-ident/lsq/1") => Kind::Lsq,
-            Some("cft-ident/validate/1") => Kind::Validate,
-            Some("cft-ident/diagnose/3") => Kind::Diagnose,
-            Some("cft-ident/drive/1") => Kind::Drive,
+            Some("cft-ident/friction/1") => SchemaKind::Friction,
+            Some("cft-ident/lsq/1") => SchemaKind::Lsq,
+            Some("cft-ident/validate/1") => SchemaKind::Validate,
+            Some("cft-ident/diagnose/3") => SchemaKind::Diagnose,
+            Some("cft-ident/drive/1") => SchemaKind::Drive,
             Some(other) => panic!("{other}"),
             None => continue,
         };
@@ -88,18 +88,18 @@ fn documents_of_cheap_commands_have_their_schema() {
     let folder = tempfile::tempdir().unwrap();
     for (kind, line) in [
         (
-            Kind::Simulate,
+            SchemaKind::Simulate,
             "simulate -r configs/cft.toml --move q4 --seconds 8 --seed 1 -o a.csv",
         ),
-        (Kind::Inspect, "inspect a.csv"),
-        (Kind::Convert, "convert a.csv a.mcap"),
+        (SchemaKind::Inspect, "inspect a.csv"),
+        (SchemaKind::Convert, "convert a.csv a.mcap"),
         (
-            Kind::Excite,
+            SchemaKind::Excite,
             "excite --check configs/cft-excitation.toml -r configs/cft.toml",
         ),
-        (Kind::New, "new mine --log a.csv"),
+        (SchemaKind::New, "new mine --log a.csv"),
         (
-            Kind::Friction,
+            SchemaKind::Friction,
             "friction a.csv -r configs/cft.toml -o one.toml",
         ),
     ] {

@@ -6,7 +6,7 @@ use crate::robot_oracle;
 use cft_ident::config::RobotFile;
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::links::{PseudoInertia, base_parameters};
-use cft_ident::robot::cft::{Setup, Structure};
+use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use robot_oracle::{Draw, Oracle};
 
 /// Frames 8 of Table 2 carry the tool; gravity acts along -z0.
@@ -72,7 +72,7 @@ fn the_chain_gives_the_general_links_of_the_reference() {
 #[test]
 fn its_regressor_has_rank_22_and_spans_the_closed_form() {
     let chain = arm();
-    let closed = Robot::cft(Setup::Tuedacs, Structure::Full22);
+    let closed = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Full22);
     let mut draw = Draw::new(22);
     let states = 60;
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
@@ -98,7 +98,7 @@ fn its_regressor_has_rank_22_and_spans_the_closed_form() {
 #[test]
 fn torques_agree_with_the_closed_form_on_random_links() {
     let chain = arm();
-    let closed = Robot::cft(Setup::Tuedacs, Structure::Full22);
+    let closed = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Full22);
     let mut draw = Draw::new(7);
     for g in &Oracle::load().general {
         let ours = chain.base_of(&standard(&g.links));

@@ -12,7 +12,7 @@ use serde::Serialize;
 use self::sums::{ErrorSums, ratio};
 use self::traces::append;
 use crate::block::Block;
-use crate::motion::{self, FilterSettings, Parallel, Stretch, Summary, rest};
+use crate::motion::{self, FilterDesign, FilterSettings, Stretch, Summary, rest};
 use crate::robot::model::{JointFriction, Model};
 
 /// Errors of one joint.
@@ -53,7 +53,8 @@ pub struct JointError {
 
 /// Errors over all joints.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Overall {
+#[schemars(rename = "Overall")]
+pub struct OverallTorqueErrors {
     /// Stacked norms over all joints; none where their units differ.
     pub relative_error: Option<f64>,
     /// The same of the rows in which each joint moves.
@@ -82,12 +83,13 @@ impl JointError {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TorqueErrors {
     pub joints: Vec<JointError>,
-    pub overall: Overall,
+    pub overall: OverallTorqueErrors,
 }
 
 /// Reconstructed logs.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Validation {
+#[schemars(rename = "Validation")]
+pub struct TorqueValidation {
     /// Over all logs.
     #[serde(flatten)]
     pub errors: TorqueErrors,
@@ -112,7 +114,7 @@ pub struct TorqueTraces {
 
 /// One row of raw torques, handed to the caller for a residual file.
 #[derive(Debug, Clone, Copy)]
-pub struct Reconstructed<'a> {
+pub struct ReconstructedRow<'a> {
     pub t: f64,
     /// Positions [m or rad] and velocities [m/s or rad/s].
     pub q: &'a [f64],
@@ -129,14 +131,14 @@ pub type HalfWidths<'a> = &'a (dyn Fn([&[f64]; 3], &[f64], &mut [f64]) + Sync);
 
 /// Where the thinning of a log's rows stands.
 #[derive(Default)]
-struct Taken {
+struct ThinningState {
     stretch: Option<usize>,
     count: usize,
     began: f64,
     every: usize,
 }
 
-impl Taken {
+impl ThinningState {
     /// Whether the next row, at `t` of `stretch`, is kept; and whether a stretch begins with it.
     fn keeps(&mut self, settings: &FilterSettings, stretch: usize, t: f64) -> (bool, bool) {
         let begins = self.stretch != Some(stretch);
@@ -153,7 +155,7 @@ impl Taken {
 }
 
 /// Errors of several logs and joints, summed log after log.
-pub struct Reconstruction<'a> {
+pub struct TorqueReconstruction<'a> {
     model: &'a Model,
     /// Speed up to which each joint rests [m/s or rad/s]; below 0 where its rows always count.
     rest_speed: Vec<f64>,
@@ -179,7 +181,7 @@ pub struct SummedRows {
     pub rows: [u64; 2],
 }
 
-impl<'a> Reconstruction<'a> {
+impl<'a> TorqueReconstruction<'a> {
     /// Nothing yet. `rest_speed`: the speed up to which each joint rests [m/s or rad/s], none where rests are
     /// not reported; joints without friction never rest. `band` is that of the model, where it has one.
     pub fn new(model: &'a Model, rest_speed: &[f64], band: Option<HalfWidths<'a>>) -> Self {
@@ -187,7 +189,7 @@ impl<'a> Reconstruction<'a> {
             (JointFriction::None, _) | (_, None) => -1.0,
             (_, Some(speed)) => *speed,
         };
-        Reconstruction {
+        TorqueReconstruction {
             model,
             rest_speed: model.friction.iter().enumerate().map(speed).collect(),
             band,
@@ -222,7 +224,7 @@ impl<'a> Reconstruction<'a> {
         &mut self,
         settings: &FilterSettings,
         source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
-        row: &mut dyn FnMut(&Reconstructed),
+        row: &mut dyn FnMut(&ReconstructedRow),
     ) -> Result<Summary, motion::RunError<E>> {
         let n = self.model.robot.joints();
         let (model, rest_speed, band) = (self.model, self.rest_speed.clone(), self.band);
@@ -230,7 +232,7 @@ impl<'a> Reconstruction<'a> {
         full.rest_speed.clone_from(&self.rest_speed);
         // every raw sample counts, so rows are thinned here and not by the pipeline
         full.decimation = Some(1);
-        let mut taken = Taken::default();
+        let mut taken = ThinningState::default();
         let summary = motion::run(
             source,
             n,
@@ -273,12 +275,12 @@ impl<'a> Reconstruction<'a> {
         segment: usize,
         stretch: &Stretch,
         reconstructed: &[Vec<f64>],
-        row: &mut dyn FnMut(&Reconstructed),
+        row: &mut dyn FnMut(&ReconstructedRow),
     ) -> Result<(), motion::MotionError> {
         let n = self.model.robot.joints();
         let mut full = settings.clone();
         full.decimation = Some(1);
-        let parallel = Parallel::design(&full, stretch.dt)?;
+        let parallel = FilterDesign::design(&full, stretch.dt)?;
         let speeds = || self.rest_speed.iter().enumerate();
         let movement = |(j, speed): (usize, &f64)| {
             let v = stretch.v[j].iter();
@@ -311,7 +313,7 @@ impl<'a> Reconstruction<'a> {
         let channels = torques.chain(&moving).chain(&widths).chain(&by_weight);
         let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
-        let mut taken = Taken::default();
+        let mut taken = ThinningState::default();
         let (mut raw, mut filtered) = (vec![0.0; 6 * n], vec![0.0; 6 * n]);
         let count = parallel.rows(stretch.len());
         let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
@@ -346,11 +348,11 @@ impl<'a> Reconstruction<'a> {
     /// Takes one row at full rate.
     fn take(
         &mut self,
-        (settings, taken): (&FilterSettings, &mut Taken),
+        (settings, taken): (&FilterSettings, &mut ThinningState),
         (segment, t): (usize, f64),
         [q, v]: [&[f64]; 2],
         [raw, filtered]: [&[f64]; 2],
-        row: &mut dyn FnMut(&Reconstructed),
+        row: &mut dyn FnMut(&ReconstructedRow),
     ) {
         let n = self.sums.len();
         let (keep, begins) = taken.keeps(settings, segment, t);
@@ -364,7 +366,7 @@ impl<'a> Reconstruction<'a> {
             };
             s.add_raw(raw[j], raw[n + j], width);
         }
-        row(&Reconstructed {
+        row(&ReconstructedRow {
             t,
             q,
             v,
@@ -383,9 +385,9 @@ impl<'a> Reconstruction<'a> {
     }
 
     /// Errors over all logs that were added, with the last log's summary.
-    pub fn finish(self, summary: Summary) -> Validation {
+    pub fn finish(self, summary: Summary) -> TorqueValidation {
         let all = self.before.iter().chain([&self.sums]);
-        Validation {
+        TorqueValidation {
             errors: self.errors(all),
             summary,
             traces: self.traces,
@@ -439,7 +441,7 @@ impl<'a> Reconstruction<'a> {
             (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
         };
         TorqueErrors {
-            overall: Overall {
+            overall: OverallTorqueErrors {
                 relative_error: one_unit.then(|| (pooled.error / pooled.torque).sqrt()),
                 relative_error_moving: part(pooled.moving, pooled.rows - pooled.resting),
                 relative_error_rest: part(pooled.rest, pooled.resting),

@@ -1,7 +1,7 @@
 //! Robot, model, trajectory and campaign files.
 //!
 //! [`config::RobotFile`] says what a robot and its logs are, [`config::ModelFile`] holds what was identified,
-//! [`config::Trajectory`] a motion and [`config::Campaign`] which logs serve for what. Each is read by `parse`, whose
+//! [`config::Trajectory`] a motion and [`config::CampaignFile`] which logs serve for what. Each is read by `parse`, whose
 //! error names file, line and key.
 //!
 //! ```

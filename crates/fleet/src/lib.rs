@@ -1,6 +1,6 @@
 //! Parameters over time, and robots of a fleet compared.
 //!
-//! [`track::follow`] makes a [`track::Course`] of one parameter from a [`track::LogEstimate`] per log;
+//! [`track::follow`] makes a [`track::ParameterCourse`] of one parameter from a [`track::LogEstimate`] per log;
 //! [`track::apart`] finds the robots of a fleet that differ.
 //!
 //! ```

@@ -1,7 +1,7 @@
 //! A plant to test against, and motions within limits. The estimators never import this crate.
 //!
 //! [`simulate::Plant`] is a robot with drives, friction and controller, run by [`simulate::run()`] along a
-//! [`simulate::Reference`], with [`simulate::Effects`] that no estimator declares. [`excite::Motion`] is a designed
+//! [`simulate::Reference`], with [`simulate::PlantEffects`] that no estimator declares. [`excite::Motion`] is a designed
 //! motion, [`excite::judge`] says whether it stays within limits and what it teaches.
 //!
 //! ```

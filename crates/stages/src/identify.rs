@@ -31,7 +31,7 @@ pub use crate::fit::consistent::{
     ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior, project,
 };
 pub use crate::fit::dynamics::{EssentialFit, IdentifiedDynamics};
-pub use crate::fit::estimate::{Account, JointAccount};
+pub use crate::fit::estimate::{EstimatorAccount, JointAccount};
 pub use crate::fit::friction::{
     FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
 };
@@ -41,7 +41,7 @@ pub use crate::fit::lsq::{LsqSettings, lsq};
 pub use crate::fit::motion_fit::MotionFit;
 pub use crate::fit::payload::payload;
 pub use crate::fit::payload_result::{
-    GainOff, LeftOfJoint, Number95, Payload, PayloadReading, PayloadVerdict,
+    GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
 };
 pub use crate::fit::weakest::WeakestPart;
 pub use crate::fleet::reduce::reduce;
@@ -50,7 +50,7 @@ pub use crate::fleet::track::{
 };
 pub use crate::fleet::track_source::TrackSource;
 pub use crate::held_out::compare::{
-    Compared, ComparisonResult, Curves, DIFFERENT, Side, TriedOnLogs, compare,
+    Compared, ComparedFile, ComparisonResult, DIFFERENT, FrictionCurves, TriedOnLogs, compare,
 };
 pub use crate::held_out::hold_out::Held;
 pub use crate::held_out::residual::{JointResidual, RelativeError};
@@ -79,5 +79,5 @@ pub use crate::input::repeated::repeated_rows;
 pub use crate::input::track_error::TrackError;
 pub use crate::input::unknowns::FittedUnknown;
 pub use crate::watch::{
-    STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch, watch_recipe,
+    RowSource, STREAM, WatchLine, WatchSettings, Watched, WatchedJoint, watch, watch_recipe,
 };

@@ -14,18 +14,21 @@ use crate::input::in_use::levers;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::temperatures;
-use crate::observe::{Alarm, Alarms, Explainer, Explanation, Observer, Recipe, recipe};
+use crate::observe::{
+    AlarmDetector, Observer, ObserverRecipe, TorqueAlarm, TorqueExplainer, TorqueExplanation,
+    recipe,
+};
 use cft_ident_core::motion::{FilterSettings, ZeroOrderHold};
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
-use cft_ident_files::config::held_out::{Excesses, HeldOut};
+use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 use cft_ident_logs::log::{Block, Instant, Provenance, Reader};
 
 /// Name of a stream in messages and results.
 pub const STREAM: &str = "-";
 
 /// Where rows come from.
-pub enum Watchable {
+pub enum RowSource {
     /// A log of any format, or one in memory.
     Log(Log),
     /// CSV with a header line, or JSON lines, as they arrive.
@@ -53,7 +56,7 @@ pub struct WatchLine<'a> {
     /// Its deviation where nothing touches the robot.
     pub std: &'a [f64],
     /// The alarm that is on.
-    pub alarm: Option<&'a Alarm>,
+    pub alarm: Option<&'a TorqueAlarm>,
 }
 
 /// A joint's threshold.
@@ -89,9 +92,9 @@ pub struct Watched {
     pub duration_s: f64,
     /// Share of them beyond the threshold.
     pub beyond: f64,
-    pub alarms: Vec<Alarm>,
+    pub alarms: Vec<TorqueAlarm>,
     /// What changed on the robot, where that explains the alarms.
-    pub explanation: Option<Explanation>,
+    pub explanation: Option<TorqueExplanation>,
     /// Why the input ended, where that was within a line or at one that cannot be read.
     pub ended_by: Option<String>,
     #[serde(skip)]
@@ -103,7 +106,7 @@ pub struct Watched {
 }
 
 /// Filters of an observer: positions of all joints come through one, as external torques were learnt.
-fn processing(machine: &LoggedRobot, excesses: &Excesses) -> FilterSettings {
+fn processing(machine: &LoggedRobot, excesses: &TorqueExcesses) -> FilterSettings {
     let settings = machine.settings();
     settings.with_one_position_filter(excesses.position_cutoff_hz)
 }
@@ -112,8 +115,8 @@ fn processing(machine: &LoggedRobot, excesses: &Excesses) -> FilterSettings {
 fn learnt<'a>(
     model: &str,
     held: &[HeldOut],
-    excesses: Option<&'a Excesses>,
-) -> Result<&'a Excesses, IdentifyError> {
+    excesses: Option<&'a TorqueExcesses>,
+) -> Result<&'a TorqueExcesses, IdentifyError> {
     let learnt = excesses.filter(|_| !held.is_empty());
     learnt.ok_or_else(|| IdentifyError::NothingHeldOut {
         model: model.to_owned(),
@@ -128,7 +131,7 @@ pub fn watch_recipe(
     given: &GivenModel,
     step_s: f64,
     per_hour: f64,
-) -> Result<Recipe, IdentifyError> {
+) -> Result<ObserverRecipe, IdentifyError> {
     let (name, file) = (given.name.as_str(), &given.file);
     let (machine, refined) = (&given.machine(), &given.numbers()?);
     let held = &file.held_out;
@@ -147,7 +150,7 @@ pub fn watch_recipe(
 /// first rows ends it with what was seen so far.
 pub fn watch(
     given: &GivenModel,
-    input: Watchable,
+    input: RowSource,
     settings: &WatchSettings,
     control: &Control,
     line: &mut dyn FnMut(&WatchLine) -> bool,
@@ -174,14 +177,14 @@ pub fn watch(
     let takes = refined.takes_temperatures();
     let mut warm = None;
     let (mut reader, of) = match input {
-        Watchable::Stream(_) if takes => {
+        RowSource::Stream(_) if takes => {
             return Err(temperatures::none_on(STREAM, refined));
         }
-        Watchable::Stream(stream) => (
+        RowSource::Stream(stream) => (
             Reader::of_stream(STREAM, stream, &layout)?,
             STREAM.to_owned(),
         ),
-        Watchable::Log(log) => {
+        RowSource::Log(log) => {
             let reader = match json_lines(&log) {
                 Some(file) => Reader::of_stream(&log.name(), file, &layout)?,
                 None => log.reader(&layout, machine.robot.joint_names())?,
@@ -194,8 +197,8 @@ pub fn watch(
         .file
         .zero_order_hold(reader.layout().channels)
         .then(|| ZeroOrderHold::new(machine.robot.joints()));
-    let mut alarms = Alarms::new(&held.joints, threshold, cutoff);
-    let mut explainer = Explainer::new(machine.robot.clone(), cutoff);
+    let mut alarms = AlarmDetector::new(&held.joints, threshold, cutoff);
+    let mut explainer = TorqueExplainer::new(machine.robot.clone(), cutoff);
     let mut over = Vec::new();
     let mut span: Option<[f64; 2]> = None;
     let mut block = Block::default();
@@ -317,7 +320,7 @@ fn blind(joints: &[WatchedJoint], held: &[HeldOut]) -> Vec<String> {
 }
 
 /// A word on a rate that the calibration is too short for.
-fn far(excesses: &Excesses, per_hour: f64) -> Option<String> {
+fn far(excesses: &TorqueExcesses, per_hour: f64) -> Option<String> {
     let hours = excesses.observed_s / 3600.0;
     (hours * per_hour < 1.0).then(|| {
         format!(

@@ -9,23 +9,23 @@ mod study;
 
 use std::path::Path;
 
-use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
+use cft_ident::friction::estimate::{FrictionOptions, JointEstimate, estimate};
 use cft_ident::identify::narrowed;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
 use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
-use cft_ident::inertia::solve::{Weighting, fit};
+use cft_ident::inertia::solve::{RowWeighting, fit};
 use cft_ident::inertia::verdict::verdict;
 use cft_ident::inertia::{accumulate, add_processing};
-use cft_ident::math::descent::Ending;
+use cft_ident::math::descent::IterationEnding;
 use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::Robot;
-use cft_ident::robot::cft::dynamics::{Coefficients, inertia};
-use cft_ident::robot::cft::{Setup, Structure};
+use cft_ident::robot::cft::dynamics::{ReportCoefficients, inertia};
+use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::simulate::cft::{excitation_at_random_phase, follow, mechanism};
-use cft_ident::simulate::{CftTruth, OneJointMove, Sensors, Settings};
-use cft_ident::validate::Reconstruction;
+use cft_ident::simulate::{CftTruth, OneJointMove, PlantSensors, Settings};
+use cft_ident::validate::TorqueReconstruction;
 use cft_ident::verdict::Verdict;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -61,13 +61,13 @@ fn curve(e: &JointEstimate, truth: &DoubleTanh) -> (f64, usize, usize) {
 }
 
 fn campaign(seed: u64) -> Value {
-    let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+    let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
     let names: Vec<String> = robot
         .parameters()
         .iter()
         .map(|p| p.name.to_string())
         .collect();
-    let truth = CftTruth::synthetic(Setup::Tuedacs)
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs)
         .varied(0.15, seed)
         .expect("a plant");
     let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
@@ -75,7 +75,7 @@ fn campaign(seed: u64) -> Value {
     let mut known = Vec::new();
     for (j, name) in JOINTS.iter().enumerate() {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
-            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+            .reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
             .expect("a ladder");
         let recording =
             follow(&truth, &[], motion, &noisy(20.0, 10 * seed + j as u64)).expect("a run");
@@ -86,15 +86,18 @@ fn campaign(seed: u64) -> Value {
         // a start that is wrong by up to a factor of three in everything, alone
         let mut wrong = |x: f64| x * FAULT.powf(chance.random_range(-1.0..1.0));
         let start = DoubleTanh::from_parameters(law.parameters().map(&mut wrong));
-        let m = inertia(&recording.q[0], &Coefficients::from_theta22(&truth.theta))[j][j];
-        let options = |only_start| Options {
+        let m = inertia(
+            &recording.q[0],
+            &ReportCoefficients::from_theta22(&truth.theta),
+        )[j][j];
+        let options = |only_start| FrictionOptions {
             start: Some(start),
             start_inertia: Some(wrong_inertia(m, seed, j)),
             only_start,
-            ..Options::default()
+            ..FrictionOptions::default()
         };
-        let end = |o: &Options| match estimate(name, &names, &prepared, None, o) {
-            Ok(e) => (curve(&e, &law).0, e.ending == Ending::Converged),
+        let end = |o: &FrictionOptions| match estimate(name, &names, &prepared, None, o) {
+            Ok(e) => (curve(&e, &law).0, e.ending == IterationEnding::Converged),
             Err(_) => (f64::INFINITY, false),
         };
         let quick = std::env::var_os("QUICK").is_some();
@@ -113,7 +116,7 @@ fn campaign(seed: u64) -> Value {
             "value": e.law.parameters(), "truth": law.parameters(),
             "std": (0..5).map(|i| e.covariance[i][i].sqrt()).collect::<Vec<_>>(),
             "nis": e.nis.mean, "widening": e.widening,
-            "converged": e.ending == Ending::Converged,
+            "converged": e.ending == IterationEnding::Converged,
             "start_with_log": with_log, "start_alone": alone, "start_alone_says_converged": said,
         }));
         known.push(Some(KnownFriction {
@@ -130,13 +133,13 @@ fn campaign(seed: u64) -> Value {
         known: known.clone(),
         rest_speed: Vec::new(),
     };
-    let motion = excitation_at_random_phase(Setup::Tuedacs, seed);
+    let motion = excitation_at_random_phase(LaboratorySetup::Tuedacs, seed);
     let recording = follow(&truth, &[], motion, &noisy(40.0, 10 * seed + 5)).expect("a run");
     let mut log = block(&recording);
     ZeroOrderHold::new(4).centre(&robot, &mut log);
     let solved = |settings: &Processing| {
         let found = accumulate(&robot, &columns, settings, &mut source(&log)).expect("a log");
-        fit(&found.0, Weighting::Wls).expect("a fit")
+        fit(&found.0, RowWeighting::Wls).expect("a fit")
     };
     let mut fit = solved(&processing());
     add_processing(&mut fit, &solved(&narrowed(&processing(), 1000.0)));
@@ -145,7 +148,7 @@ fn campaign(seed: u64) -> Value {
             let mut read = source(&log);
             let found = accumulate_shifted(&robot, &columns, None, &processing(), grid, &mut read);
             let sums = found.expect("a log").expect("its encoders are known");
-            cft_ident::inertia::solve::fit(&sums, Weighting::Wls).expect("a fit")
+            cft_ident::inertia::solve::fit(&sums, RowWeighting::Wls).expect("a fit")
         })
         .collect();
     add_scatter(&mut fit, &shifted);
@@ -174,7 +177,7 @@ fn campaign(seed: u64) -> Value {
     let true_model = model(truth.printed().to_vec(), truth.friction);
     let mut settings = noisy(20.0, 10 * seed + 6);
     let sensed = errors(&robot, &truth, &settings, &[&estimated, &true_model]);
-    settings.sensors = Sensors::perfect();
+    settings.sensors = PlantSensors::perfect();
     let clean = errors(&robot, &truth, &settings, &[&estimated, &true_model]);
     json!({
         "seed": seed, "joints": joints, "theta": theta,
@@ -208,7 +211,7 @@ fn errors(
     models
         .iter()
         .map(|model| {
-            let mut all = Reconstruction::new(model, &[], None);
+            let mut all = TorqueReconstruction::new(model, &[], None);
             let summary = all
                 .add(&processing(), &mut source(&log), &mut |_| {})
                 .expect("a log");

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use cft_ident::config::{RobotFile, Trajectory};
-use cft_ident::excite::information::Information;
+use cft_ident::excite::information::InformationFactors;
 use cft_ident::excite::machine::ForeseenRobot;
-use cft_ident::excite::search::{Task, design};
+use cft_ident::excite::search::{DesignTask, design};
 use cft_ident::excite::series::Series;
 use cft_ident::excite::usage::{along_period, worst};
 use cft_ident::excite::{Criterion, machine, series_of};
@@ -42,7 +42,7 @@ fn main() {
         for free in [true, false] {
             for criterion in [Criterion::Condition, Criterion::ConditionNormalised] {
                 let before = processor_seconds();
-                let task = Task {
+                let task = DesignTask {
                     criterion: criterion.clone(),
                     fundamental_hz: 0.4,
                     harmonics: 4,
@@ -117,7 +117,7 @@ fn offsets(machine: &ForeseenRobot, table_3: &Series, free: bool) -> Vec<Option<
 }
 
 fn row(machine: &ForeseenRobot, series: &Series, mut line: Value) -> Value {
-    let information = Information::of_period(machine, series, 250).expect("reachable");
+    let information = InformationFactors::of_period(machine, series, 250).expect("reachable");
     for (name, criterion) in [
         ("J_k raw", Criterion::Condition),
         ("J_k normalised", Criterion::ConditionNormalised),

@@ -15,10 +15,10 @@ use std::path::Path;
 
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
-use cft_ident::inertia::solve::{Weighting, fit};
+use cft_ident::inertia::solve::{RowWeighting, fit};
 use cft_ident::motion::ZeroOrderHold;
 use cft_ident::robot::Robot;
-use cft_ident::robot::cft::{Setup, Structure};
+use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use cft_ident::simulate::cft::{excitation_at_random_phase, follow, mechanism};
 use cft_ident::simulate::{CftTruth, Noise, OneJointMove, Settings, SimulatedRun};
 use serde_json::{Value, json};
@@ -41,7 +41,7 @@ fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFrict
     let names: Vec<String> = infos.iter().map(|p| p.name.to_string()).collect();
     let of = |j: usize| {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
-            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+            .reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
             .expect("a ladder");
         let settings = noisy(20.0, 10 * seed + j as u64);
         let log = block(&follow(truth, &[], motion, &settings).expect("a run"));
@@ -56,8 +56,8 @@ fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFrict
 }
 
 fn campaigns(seed: u64) -> Value {
-    let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
-    let truth = CftTruth::synthetic(Setup::Tuedacs)
+    let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs)
         .varied(0.15, seed)
         .expect("a plant");
     let columns = RegressorColumns {
@@ -71,14 +71,14 @@ fn campaigns(seed: u64) -> Value {
         let mut log = block(recording);
         ZeroOrderHold::new(4).centre(&robot, &mut log);
         let found = accumulate(&robot, &columns, &processing(), &mut source(&log)).expect("a log");
-        let fit = fit(&found.0, Weighting::Wls).expect("a fit");
+        let fit = fit(&found.0, RowWeighting::Wls).expect("a fit");
         fit.theta.as_slice().to_vec()
     };
     let run = |designed: bool, settings: &Settings<4>| {
         let motion = if designed {
             along(series(DESIGNED))
         } else {
-            excitation_at_random_phase(Setup::Tuedacs, seed)
+            excitation_at_random_phase(LaboratorySetup::Tuedacs, seed)
         };
         follow(&truth, &[], motion, settings).expect("a run")
     };

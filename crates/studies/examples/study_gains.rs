@@ -24,7 +24,7 @@ use cft_ident::identify::{
 };
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::accumulate::BlockFactors;
-use cft_ident::inertia::columns::{Own, RegressorColumns};
+use cft_ident::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident::log::LogSpec;
 use cft_ident::math::rank::svd;
 use cft_ident::math::rfactor::RFactor;
@@ -106,7 +106,7 @@ fn linear(machine: &LoggedRobot, logs: [&Log; 2], mass: f64, control: &Control) 
     let columns = RegressorColumns {
         joints: n,
         shared: p,
-        own: vec![vec![Own::Viscous, Own::Coulomb]; n],
+        own: vec![vec![JointTerm::Viscous, JointTerm::Coulomb]; n],
         known: vec![None; n],
         rest_speed: Vec::new(),
     };

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::{Bench, FUNDAMENTAL_HZ};
+use super::{ExciteRun, FUNDAMENTAL_HZ};
 use crate::cli::error::CliError;
 use cft_ident_core::effect::entry;
 use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::escape;
-use cft_ident_plant::excite::information::Information;
+use cft_ident_plant::excite::information::InformationFactors;
 use cft_ident_plant::excite::limits::Quantity;
 use cft_ident_plant::excite::machine::ForeseenRobot;
-use cft_ident_plant::excite::strokes::Memory;
+use cft_ident_plant::excite::strokes::FrictionMemory;
 use cft_ident_plant::excite::{Criterion, ExciteError, InformationBefore, usual_motion};
 use cft_ident_stages::identify::LoggedRobot;
 
@@ -18,13 +18,13 @@ use cft_ident_stages::identify::LoggedRobot;
 const SAMPLES_PER_PERIOD: usize = 100;
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Aim {
+pub(super) enum ExciteAim {
     /// The parameters that are not identified.
     Weak,
     /// An effect of a joint with a memory, which strokes at several amplitudes separate.
     Strokes {
         joint: String,
-        effect: Memory,
+        effect: FrictionMemory,
         width: f64,
         torque: f64,
     },
@@ -37,7 +37,7 @@ pub(super) enum Aim {
     },
 }
 
-impl Aim {
+impl ExciteAim {
     /// `weak`, or `EFFECT:JOINT`.
     pub fn of(text: &str, file: &RobotFile, model: Option<&ModelFile>) -> Result<Self, CliError> {
         let Some((name, rest)) = text.split_once(':') else {
@@ -85,10 +85,10 @@ fn strokes(
     (name, joint): (&str, &str),
     given: &str,
     model: Option<&ModelFile>,
-) -> Result<Option<Aim>, CliError> {
+) -> Result<Option<ExciteAim>, CliError> {
     let effect = match name {
-        "backlash" => Memory::Gap,
-        "presliding" => Memory::Bristle,
+        "backlash" => FrictionMemory::Gap,
+        "presliding" => FrictionMemory::Bristle,
         _ => return Ok(None),
     };
     let mut numbers: BTreeMap<String, f64> = BTreeMap::new();
@@ -109,8 +109,8 @@ fn strokes(
     }
     let number = |key: &str| numbers.get(key).copied().filter(|x| x.is_finite());
     let of = match effect {
-        Memory::Gap => number("gap").zip(number("c")),
-        Memory::Bristle => {
+        FrictionMemory::Gap => number("gap").zip(number("c")),
+        FrictionMemory::Bristle => {
             let both = number("fc").zip(number("sigma0"));
             both.map(|(fc, sigma0)| (fc / sigma0, fc))
         }
@@ -118,7 +118,7 @@ fn strokes(
     // without its size the usual speeds of the joint alone are the best guess
     Ok(of
         .filter(|(width, torque)| *width > 0.0 && *torque != 0.0)
-        .map(|(width, torque)| Aim::Strokes {
+        .map(|(width, torque)| ExciteAim::Strokes {
             joint: joint.to_owned(),
             effect,
             width,
@@ -158,7 +158,7 @@ pub(super) fn noise(model: &ModelFile, rate_hz: f64, machine: &mut ForeseenRobot
 
 /// What a model knows, and the criterion that narrows what is weak in it.
 pub(super) fn weak(
-    bench: &Bench,
+    bench: &ExciteRun,
     model: &ModelFile,
 ) -> Result<(InformationBefore, Criterion), CliError> {
     let (args, machine) = (bench.args, &bench.machine);
@@ -171,8 +171,8 @@ pub(super) fn weak(
     }
     let fundamental = std::f64::consts::TAU * bench.frequency_hz;
     let series = usual_motion(machine, fundamental, usize::from(args.harmonics));
-    let usual =
-        Information::of_period(machine, &series, SAMPLES_PER_PERIOD).map_err(ExciteError::Robot)?;
+    let usual = InformationFactors::of_period(machine, &series, SAMPLES_PER_PERIOD)
+        .map_err(ExciteError::Robot)?;
     let rows = bench.rate_hz * series.period() * f64::from(args.periods);
     let factors = known.factors(machine, (&usual, rows))?;
     Ok((known, Criterion::AOptimal(factors)))

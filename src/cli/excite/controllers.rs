@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::{Bench, samples};
+use super::{ExciteRun, samples};
 use crate::cli::CliError;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
 use cft_ident_logs::log::{escape, escape_whole};
 use cft_ident_logs::output::JointTrajectory;
-use cft_ident_plant::excite::{ExciteError, Judgement, Motion};
+use cft_ident_plant::excite::{ExciteError, Motion, MotionJudgement};
 
 /// Most lines of a program: controllers hold them in memory.
 const MOST_POINTS: f64 = 1e6;
@@ -18,9 +18,9 @@ const OF_UR: usize = 6;
 
 /// Writes the program that is asked for.
 pub(super) fn write(
-    bench: &Bench,
+    bench: &ExciteRun,
     motion: &Motion,
-    judged: &Judgement,
+    judged: &MotionJudgement,
     path: &Path,
 ) -> Result<(), CliError> {
     let robot = &bench.machine.model.robot;
@@ -38,9 +38,9 @@ pub(super) fn write(
 
 /// The motion at the rate of the run.
 fn sampled(
-    bench: &Bench,
+    bench: &ExciteRun,
     motion: &Motion,
-    judged: &Judgement,
+    judged: &MotionJudgement,
 ) -> Result<JointTrajectory, CliError> {
     let machine = &bench.machine;
     let n = machine.coordinates();
@@ -62,7 +62,7 @@ fn sampled(
 }
 
 /// What is to be known before the robot moves; what nobody has checked comes first.
-fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
+fn notes(bench: &ExciteRun, judged: &MotionJudgement) -> Vec<String> {
     let [first, second] = judged.first_words();
     vec![
         escape_whole(first),

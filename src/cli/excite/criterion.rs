@@ -1,6 +1,6 @@
 //! What a motion is to make small.
 
-use super::{Bench, CriterionName};
+use super::{CriterionName, ExciteRun};
 use crate::cli::error::CliError;
 use cft_ident_plant::excite::Criterion;
 use cft_ident_plant::excite::machine::ForeseenRobot;
@@ -13,7 +13,7 @@ pub fn weights(machine: &ForeseenRobot, criterion: &Criterion) -> Vec<f64> {
     }
 }
 
-pub fn criterion(bench: &Bench) -> Result<Criterion, CliError> {
+pub fn criterion(bench: &ExciteRun) -> Result<Criterion, CliError> {
     let args = bench.args;
     let names = bench.machine.unknown_names();
     let place = |name: &String| {

@@ -3,7 +3,7 @@
 use cft_ident_core::explain::Explain;
 use std::path::Path;
 
-use super::Bench;
+use super::ExciteRun;
 use crate::cli::error::CliError;
 use crate::cli::files;
 use cft_ident_core::inertia::accumulate;
@@ -36,7 +36,7 @@ pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut ForeseenRobot
 
 /// Adds what a log or a trajectory says.
 pub(super) fn add(
-    bench: &mut Bench,
+    bench: &mut ExciteRun,
     name: &str,
     given: &mut GivenInformation,
     warnings: &mut Vec<String>,

@@ -6,12 +6,12 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::Bench;
+use super::ExciteRun;
 use crate::cli::{CliError, Outcome};
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::held::{PoseToHold, poses_to_hold};
-use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::table::{CellAlignment, Table};
 
 /// Poses that were chosen.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -53,12 +53,16 @@ fn text(joints: &[String], poses: &[PoseToHold]) -> String {
     out
 }
 
-pub(super) fn run(bench: &Bench, count: usize, path: &Path) -> Result<Outcome, CliError> {
+pub(super) fn run(bench: &ExciteRun, count: usize, path: &Path) -> Result<Outcome, CliError> {
     let poses = poses_to_hold(&bench.machine, count, bench.args.seed)?;
     let joints = bench.machine.coordinate_names();
     bench.context.write_text(path, &text(&joints, &poses))?;
-    let mut columns = vec![("pose", Align::Right)];
-    columns.extend(joints.iter().map(|joint| (joint.as_str(), Align::Decimal)));
+    let mut columns = vec![("pose", CellAlignment::Right)];
+    columns.extend(
+        joints
+            .iter()
+            .map(|joint| (joint.as_str(), CellAlignment::Decimal)),
+    );
     let shown = path.display();
     let mut table = Table::new(&columns).caption(&format!(
         "{} poses to hold, each reached from both sides, about {:.0} min: {}",
@@ -83,6 +87,6 @@ pub(super) fn run(bench: &Bench, count: usize, path: &Path) -> Result<Outcome, C
         joints,
         poses: poses.into_iter().map(of_file).collect(),
     };
-    let document = Document::new("excite-static", &bench.inputs, &[], &result)?;
+    let document = JsonDocument::new("excite-static", &bench.inputs, &[], &result)?;
     Ok(Outcome::new(bench.context.text(text, &brief), document))
 }

@@ -1,20 +1,20 @@
 //! A motion judged on the bench of a run, and what is written of it.
 
-use super::Bench;
+use super::ExciteRun;
 use crate::cli::error::CliError;
 use cft_ident_core::number;
 use cft_ident_plant::excite::limits::BoundedQuantity;
 use cft_ident_plant::excite::{
-    GivenInformation, Judgement, LawForeseen, Motion, MotionTerms, judge,
+    GivenInformation, LawForeseen, Motion, MotionJudgement, MotionTerms, judge,
 };
 
 pub(super) fn judged(
-    bench: &Bench,
+    bench: &ExciteRun,
     motion: &Motion,
     channels: &[BoundedQuantity],
     given: Option<&GivenInformation>,
     friction: Option<LawForeseen>,
-) -> Result<Judgement, CliError> {
+) -> Result<MotionJudgement, CliError> {
     let terms = MotionTerms {
         channels,
         given,
@@ -29,7 +29,7 @@ pub(super) fn judged(
 }
 
 /// A design that breaks a limit is never written.
-pub(super) fn refuse_broken(judged: &Judgement) -> Result<(), CliError> {
+pub(super) fn refuse_broken(judged: &MotionJudgement) -> Result<(), CliError> {
     let Some(first) = judged.broken().into_iter().next() else {
         return Ok(());
     };
@@ -38,7 +38,7 @@ pub(super) fn refuse_broken(judged: &Judgement) -> Result<(), CliError> {
 }
 
 /// The comment at the head of the trajectory file.
-pub(super) fn head(judged: &Judgement) -> String {
+pub(super) fn head(judged: &MotionJudgement) -> String {
     let version = env!("CARGO_PKG_VERSION");
     let torques = &judged.torques;
     if let Some(friction) = &judged.friction {
@@ -61,7 +61,7 @@ pub(super) fn head(judged: &Judgement) -> String {
     )
 }
 
-fn criterion_name(bench: &Bench) -> String {
+fn criterion_name(bench: &ExciteRun) -> String {
     use clap::ValueEnum;
     if let Some(aim) = &bench.args.aim {
         return format!("for {aim}");

@@ -26,17 +26,17 @@ use cft_ident_plant::excite::ladder::foresee_ladder;
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::usage::check_pose;
 use cft_ident_plant::excite::{
-    ExciteError, GivenInformation, Judgement, Judgements, LawForeseen, Motion, PriorInformation,
-    foresee, machine, usual_torque,
+    ExciteError, GivenInformation, LawForeseen, Motion, MotionJudgement, MotionJudgements,
+    PriorInformation, foresee, machine, usual_torque,
 };
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::{Report, stages};
 
-use aim::Aim;
+use aim::ExciteAim;
 use criterion::weights;
 use judge::{head, judged, refuse_broken};
-use names::Names;
+use names::OutputNames;
 use one_joint::{ladder, ladder_task, strokes};
 use search::{blended, searched, task};
 
@@ -186,7 +186,8 @@ impl From<ExciteError> for CliError {
     }
 }
 
-struct Bench<'a> {
+/// A run of `excite`: its arguments and the robot that it designs for.
+struct ExciteRun<'a> {
     args: &'a Args,
     context: &'a Context,
     file: RobotFile,
@@ -194,18 +195,18 @@ struct Bench<'a> {
     /// Name of the file that the robot is from.
     robot: String,
     model: Option<ModelFile>,
-    aim: Option<Aim>,
+    aim: Option<ExciteAim>,
     rate_hz: f64,
     frequency_hz: f64,
     inputs: Vec<Provenance>,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let all = Names::of(args);
+    let all = OutputNames::of(args);
     let read = [&args.robot, &args.model, &args.check];
     let read = read.into_iter().filter_map(|path| path.as_deref());
     let read = read.chain(args.with.iter().map(Path::new));
-    context.check_outputs(read, all.iter().flat_map(Names::paths))?;
+    context.check_outputs(read, all.iter().flat_map(OutputNames::paths))?;
 
     let model = args.model.as_deref();
     let model = model.map(|path| files::model(path, context)).transpose()?;
@@ -226,7 +227,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let named = model.as_ref();
     let named = named.map(|given| (given.name.as_str(), &given.value.file));
     let aim = args.aim.as_ref();
-    let aim = aim.map(|text| Aim::of(text, &file, named.map(|(_, model)| model)));
+    let aim = aim.map(|text| ExciteAim::of(text, &file, named.map(|(_, model)| model)));
     let aim = aim.transpose()?;
     if let (Some(_), Some((_, model))) = (&aim, named) {
         model.limit_to_seen(&mut file.limits);
@@ -249,7 +250,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let (Some(_), Some((_, model))) = (&aim, named) {
         aim::noise(model, rate_hz, &mut machine);
     }
-    let mut bench = Bench {
+    let mut bench = ExciteRun {
         args,
         context,
         rate_hz,
@@ -262,7 +263,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         inputs,
     };
     let joint = match (&args.joint, &bench.aim) {
-        (_, Some(Aim::Ladder { joint, .. })) => Some(joint.clone()),
+        (_, Some(ExciteAim::Ladder { joint, .. })) => Some(joint.clone()),
         (joint, _) => joint.clone(),
     };
     if let (Some(count), Some(path)) = (args.held, &args.output) {
@@ -271,7 +272,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     match (&args.check, joint) {
         (Some(path), _) => check(&mut bench, path, &all[0]),
         (None, Some(joint)) => ladder(&bench, &joint, &all[0]),
-        (None, None) if matches!(bench.aim, Some(Aim::Strokes { .. })) => strokes(&bench, &all[0]),
+        (None, None) if matches!(bench.aim, Some(ExciteAim::Strokes { .. })) => {
+            strokes(&bench, &all[0])
+        }
         (None, None) => designs(&mut bench, &all),
     }
 }
@@ -283,7 +286,7 @@ const ROBOT: &str = "configs/cft.toml";
 const RATE_HZ: f64 = 1000.0;
 
 /// Judges a trajectory that is there.
-fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliError> {
+fn check(bench: &mut ExciteRun, path: &Path, names: &OutputNames) -> Result<Outcome, CliError> {
     let args = bench.args;
     let given = files::trajectory(path)?;
     bench.inputs.push(given.provenance);
@@ -303,7 +306,7 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
     };
     let judged = judged(bench, &motion, &channels, None, friction)?;
     let report = written(bench, &motion, &judged, names, (&given.name, None))?;
-    let document = Document::new("excite", &bench.inputs, &judged.warnings, &judged)?;
+    let document = JsonDocument::new("excite", &bench.inputs, &judged.warnings, &judged)?;
     Ok(Outcome {
         missed: judged.broken(),
         ..Outcome::new(report.text_for(bench.context.screen), document)
@@ -311,7 +314,7 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
 }
 
 /// Designs one motion after the other, each with those before it given.
-fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
+fn designs(bench: &mut ExciteRun, names: &[OutputNames]) -> Result<Outcome, CliError> {
     let args = bench.args;
     if let Some(from) = &args.from {
         check_pose(&bench.machine, from)?;
@@ -324,7 +327,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         given::add(bench, name, &mut given, &mut warnings)?;
         any = true;
     }
-    if let (Some(Aim::Weak), Some(model)) = (&bench.aim, &bench.model) {
+    if let (Some(ExciteAim::Weak), Some(model)) = (&bench.aim, &bench.model) {
         let (known, criterion) = aim::weak(bench, model)?;
         given.add_known(&known.information);
         task.criterion = criterion;
@@ -334,7 +337,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     let period = 1.0 / bench.frequency_hz;
     let rows = bench.rate_hz * period * f64::from(args.periods);
     let mut text = String::new();
-    let mut all: Vec<Judgement> = Vec::new();
+    let mut all: Vec<MotionJudgement> = Vec::new();
     keep_what_there_is();
     for names in names {
         task.prior = any.then(|| PriorInformation {
@@ -363,17 +366,18 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         given.add_motion(&information, rows);
         any = true;
     }
-    let result = Judgements::of(all).ok_or_else(|| CliError::usage("no motion is asked for"))?;
-    let document = Document::new("excite", &bench.inputs, &warnings, &result)?;
+    let result =
+        MotionJudgements::of(all).ok_or_else(|| CliError::usage("no motion is asked for"))?;
+    let document = JsonDocument::new("excite", &bench.inputs, &warnings, &result)?;
     Ok(Outcome::new(text, document))
 }
 
 /// The report of a motion, after all that is asked for is written: its trajectory, named `shown`, where it is new.
 fn written(
-    bench: &Bench,
+    bench: &ExciteRun,
     motion: &Motion,
-    judged: &Judgement,
-    names: &Names,
+    judged: &MotionJudgement,
+    names: &OutputNames,
     (shown, trajectory): (&str, Option<Trajectory>),
 ) -> Result<Report, CliError> {
     let title = cli::file_name(Path::new(shown));

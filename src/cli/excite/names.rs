@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::Args;
 
-pub(super) struct Names {
+/// Files that the design is written to.
+pub(super) struct OutputNames {
     pub trajectory: Option<PathBuf>,
     pub samples: Option<PathBuf>,
     pub urscript: Option<PathBuf>,
@@ -12,7 +13,7 @@ pub(super) struct Names {
     pub report: Option<PathBuf>,
 }
 
-impl Names {
+impl OutputNames {
     /// One set for each motion; several are numbered.
     pub fn of(args: &Args) -> Vec<Self> {
         let numbered = |path: &Option<PathBuf>, k: u16| match args.trajectories {

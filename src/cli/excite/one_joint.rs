@@ -1,20 +1,20 @@
 //! The one-joint experiment.
 
-use super::aim::Aim;
+use super::aim::ExciteAim;
 use super::judge::{judged, refuse_broken};
-use super::names::Names;
-use super::{Bench, written};
+use super::names::OutputNames;
+use super::{ExciteRun, written};
 use crate::cli::{CliError, Outcome};
 use cft_ident_files::config::Trajectory;
 use cft_ident_plant::excite::ladder::{LadderTask, design_ladder};
 use cft_ident_plant::excite::strokes::{StrokesTask, design_strokes};
 use cft_ident_plant::excite::{LawForeseen, Motion};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_stages::identify::LoggedRobot;
 
-pub(super) fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
+pub(super) fn ladder_task(bench: &ExciteRun, joint: &str) -> LadderTask {
     let (seconds, part) = match &bench.aim {
-        Some(Aim::Ladder { seconds, part, .. }) => (*seconds, *part),
+        Some(ExciteAim::Ladder { seconds, part, .. }) => (*seconds, *part),
         _ => (bench.args.seconds, 1.0),
     };
     LadderTask {
@@ -28,8 +28,8 @@ pub(super) fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
 }
 
 /// Strokes that tell an effect with a memory from its like.
-pub(super) fn strokes(bench: &Bench, names: &Names) -> Result<Outcome, CliError> {
-    let Some(Aim::Strokes {
+pub(super) fn strokes(bench: &ExciteRun, names: &OutputNames) -> Result<Outcome, CliError> {
+    let Some(ExciteAim::Strokes {
         joint,
         effect,
         width,
@@ -66,11 +66,15 @@ pub(super) fn strokes(bench: &Bench, names: &Names) -> Result<Outcome, CliError>
     let report = written(bench, &motion, &judged, names, of)?;
     Ok(Outcome::new(
         report.text_for(bench.context.screen),
-        Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
+        JsonDocument::new("excite", &bench.inputs, &judged.warnings, &judged)?,
     ))
 }
 
-pub(super) fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError> {
+pub(super) fn ladder(
+    bench: &ExciteRun,
+    joint: &str,
+    names: &OutputNames,
+) -> Result<Outcome, CliError> {
     let bar = bench.context.progress("designing", None);
     let task = ladder_task(bench, joint);
     let found = design_ladder(&bench.machine, &task)?;
@@ -91,6 +95,6 @@ pub(super) fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcom
     let report = written(bench, &motion, &judged, names, of)?;
     Ok(Outcome::new(
         report.text_for(bench.context.screen),
-        Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
+        JsonDocument::new("excite", &bench.inputs, &judged.warnings, &judged)?,
     ))
 }

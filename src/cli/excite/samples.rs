@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::Bench;
+use super::ExciteRun;
 use crate::cli::{CliError, columns_of};
 use cft_ident_core::number;
-use cft_ident_files::config::trajectory::Coordinates;
+use cft_ident_files::config::trajectory::TrajectoryCoordinates;
 use cft_ident_logs::output::LogWriter;
 use cft_ident_plant::excite::{ExciteError, Motion};
 
@@ -15,10 +15,10 @@ const MOST_ROWS: f64 = 1e8;
 const BLOCK: usize = 4096;
 
 /// Writes t, and positions, speeds and accelerations of the joints and of actuators that differ.
-pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), CliError> {
+pub(super) fn write(bench: &ExciteRun, motion: &Motion, path: &Path) -> Result<(), CliError> {
     let machine = &bench.machine;
     let n = machine.coordinates();
-    let actuators = machine.designed() == Coordinates::Cartesian;
+    let actuators = machine.designed() == TrajectoryCoordinates::Cartesian;
     let mut header = columns_of(&["q", "dq", "ddq"], machine.model.robot.joint_names());
     if actuators {
         for prefix in ["", "d", "dd"] {
@@ -46,7 +46,7 @@ pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), C
 }
 
 /// Number of samples of a motion, of which a file may have `most`.
-pub(super) fn rows(bench: &Bench, motion: &Motion, most: f64) -> Result<usize, CliError> {
+pub(super) fn rows(bench: &ExciteRun, motion: &Motion, most: f64) -> Result<usize, CliError> {
     if motion.seconds() * bench.rate_hz > most {
         let [s, hz] = [motion.seconds(), bench.rate_hz].map(|x| number::significant(x, 4));
         let text = format!("{s} s at {hz} Hz are more than {most:e} samples");

@@ -1,11 +1,11 @@
 //! The search of a motion, as the command line asks for it.
 
-use super::Bench;
+use super::ExciteRun;
 use super::criterion::criterion;
 use crate::cli::error::CliError;
 use cft_ident_files::config::trajectory::FourierSection;
-use cft_ident_plant::excite::blend::Blend;
-use cft_ident_plant::excite::search::{FoundMotion, Task, design};
+use cft_ident_plant::excite::blend::TimeScaling;
+use cft_ident_plant::excite::search::{DesignTask, FoundMotion, design};
 use cft_ident_plant::excite::series::Series;
 use cft_ident_plant::excite::{Motion, trajectory};
 
@@ -14,9 +14,9 @@ use cft_ident_plant::excite::{Motion, trajectory};
 const STARTS: usize = 16;
 
 /// What the command line asks for, with nothing known before.
-pub(super) fn task(bench: &Bench) -> Result<Task, CliError> {
+pub(super) fn task(bench: &ExciteRun) -> Result<DesignTask, CliError> {
     let args = bench.args;
-    Ok(Task {
+    Ok(DesignTask {
         criterion: criterion(bench)?,
         fundamental_hz: bench.frequency_hz,
         harmonics: usize::from(args.harmonics),
@@ -29,7 +29,7 @@ pub(super) fn task(bench: &Bench) -> Result<Task, CliError> {
     })
 }
 
-pub(super) fn searched(bench: &Bench, task: &Task) -> Result<FoundMotion, CliError> {
+pub(super) fn searched(bench: &ExciteRun, task: &DesignTask) -> Result<FoundMotion, CliError> {
     let context = bench.context;
     let bar = context.progress("designing", Some(task.most_evaluations()));
     let advance = |steps| bar.advance(steps);
@@ -41,11 +41,14 @@ pub(super) fn searched(bench: &Bench, task: &Task) -> Result<FoundMotion, CliErr
 }
 
 /// The motion from rest to rest, and as a file.
-pub(super) fn blended(bench: &Bench, series: Series) -> Result<(Motion, FourierSection), CliError> {
+pub(super) fn blended(
+    bench: &ExciteRun,
+    series: Series,
+) -> Result<(Motion, FourierSection), CliError> {
     let (args, machine) = (bench.args, &bench.machine);
     let reserved = machine.channels.iter().map(|c| c.reserved(args.margin));
     let (reserved, from): (Vec<_>, _) = (reserved.collect(), args.from.as_deref());
-    let blend = Blend::within(machine, &reserved, &series, args.periods, from)?;
+    let blend = TimeScaling::within(machine, &reserved, &series, args.periods, from)?;
     let fourier = FourierSection {
         start_s: Some(blend.start),
         blend_s: Some(blend.seconds),

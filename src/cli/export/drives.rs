@@ -1,13 +1,13 @@
 //! Exports of a model file of `drive`.
 
-use super::{Args, Exported, Written};
+use super::{Args, ExportedModel, WrittenFile};
 use crate::cli::{CliError, Context, Outcome, file_name};
 use cft_ident_drive::drive::drive_file::DriveFile;
 use cft_ident_drive::drive::export::{ExportGains, ExportedText, bam, isaaclab, mjcf};
 use cft_ident_files::config;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::table::{CellAlignment, Table};
 
 /// Whether one of them is asked for.
 pub(super) fn asked(args: &Args) -> bool {
@@ -61,7 +61,7 @@ pub(super) fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             isaaclab::actuators(&file, &gains()?)?,
         ));
     }
-    let mut table = Table::new(&[("file", Align::Left), ("what", Align::Left)])
+    let mut table = Table::new(&[("file", CellAlignment::Left), ("what", CellAlignment::Left)])
         .caption(&format!("drives of {name} for simulators"));
     let mut warnings = Vec::new();
     let mut files = Vec::new();
@@ -74,14 +74,14 @@ pub(super) fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 .iter()
                 .map(|line| format!("{shown} does not say: {line}")),
         );
-        files.push(Written {
+        files.push(WrittenFile {
             file: shown,
             what: what.to_owned(),
         });
     }
     let names: Vec<&str> = files.iter().map(|of| of.file.as_str()).collect();
     let brief = format!("written: {}", names.join(", "));
-    let result = Exported {
+    let result = ExportedModel {
         joints: file.drive.joints.clone(),
         files,
         left_out: warnings.clone(),
@@ -91,6 +91,6 @@ pub(super) fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs = [Provenance::of_text(&file_name(&args.model), &text)];
     Ok(Outcome::new(
         context.text(table.to_string(), &brief),
-        Document::new("export", &inputs, &warnings, &result)?,
+        JsonDocument::new("export", &inputs, &warnings, &result)?,
     ))
 }

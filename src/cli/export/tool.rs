@@ -4,10 +4,10 @@ use super::Args;
 use crate::cli::{CliError, Context, Outcome, arguments, file_name, tool::failed};
 use cft_ident_export::export::header::identifier;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_report::report::json::Document;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_tool::tool::{ToolFile, c_function};
 
-use super::{Exported, Written, stem};
+use super::{ExportedModel, WrittenFile, stem};
 
 /// Writes what was asked for of a tool's file.
 pub(super) fn run(args: &Args, text: &str, context: &Context) -> Result<Outcome, CliError> {
@@ -37,7 +37,7 @@ pub(super) fn run(args: &Args, text: &str, context: &Context) -> Result<Outcome,
         let header = c_function(&file, &identifier(&stem(path)), &lines);
         context.write_text(path, &header.ok_or_else(undetermined)?)?;
         out += &format!("written: {}\n", path.display());
-        files.push(Written {
+        files.push(WrittenFile {
             file: file_name(path),
             what: "C99 header".to_owned(),
         });
@@ -51,14 +51,14 @@ pub(super) fn run(args: &Args, text: &str, context: &Context) -> Result<Outcome,
     let lines = args
         .controller
         .map(|_| out.lines().map(str::to_owned).collect());
-    let result = Exported {
+    let result = ExportedModel {
         joints: Vec::new(),
         files,
         left_out: Vec::new(),
         beyond: Vec::new(),
         lines,
     };
-    let document = Document::new("export", &[provenance], &[], &result)?;
+    let document = JsonDocument::new("export", &[provenance], &[], &result)?;
     Ok(Outcome::new(out, document))
 }
 

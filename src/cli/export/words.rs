@@ -1,11 +1,11 @@
 //! What exported files and the terminal say of what is left out.
 
-use super::Beyond;
+use super::FormatOmission;
 use cft_ident_core::number;
 use cft_ident_export::export::Program;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::escape;
-use cft_ident_report::report::table::{Align, Table};
+use cft_ident_report::report::table::{CellAlignment, Table};
 
 /// The effects of a model, as a person names them.
 pub(super) fn effects(file: &ModelFile) -> Vec<String> {
@@ -16,15 +16,15 @@ pub(super) fn effects(file: &ModelFile) -> Vec<String> {
     file.effects.iter().map(of).collect()
 }
 
-pub(super) fn beyond_table(beyond: &[Beyond]) -> String {
+pub(super) fn beyond_table(beyond: &[FormatOmission]) -> String {
     if beyond.is_empty() {
         return String::new();
     }
     let mut table = Table::new(&[
-        ("file", Align::Left),
-        ("what it cannot say", Align::Left),
-        ("% of torque", Align::Decimal),
-        ("at", Align::Left),
+        ("file", CellAlignment::Left),
+        ("what it cannot say", CellAlignment::Left),
+        ("% of torque", CellAlignment::Decimal),
+        ("at", CellAlignment::Left),
     ]);
     for part in beyond {
         let percent = part.percent_of_torque;

@@ -4,8 +4,8 @@ use clap::CommandFactory;
 use clap_complete::Shell;
 use serde_json::json;
 
-use crate::cli::{Cli, CliError, Outcome};
-use cft_ident_report::report::json::Document;
+use crate::cli::{CliError, CommandLine, Outcome};
+use cft_ident_report::report::json::JsonDocument;
 
 /// Write the completion script of a shell to standard output.
 #[derive(Debug, Clone, clap::Args)]
@@ -17,9 +17,14 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "cft-ident", &mut script);
+    clap_complete::generate(
+        args.shell,
+        &mut CommandLine::command(),
+        "cft-ident",
+        &mut script,
+    );
     let text = String::from_utf8_lossy(&script).into_owned();
     let result = json!({"shell": args.shell.to_string(), "script": text});
-    let document = Document::new("generate", &[], &[], &result)?;
+    let document = JsonDocument::new("generate", &[], &[], &result)?;
     Ok(Outcome::new(text, document))
 }

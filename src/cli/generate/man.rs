@@ -6,8 +6,8 @@ use clap::CommandFactory;
 use clap_mangen::Man;
 use serde_json::json;
 
-use crate::cli::{Cli, CliError, Context, Outcome};
-use cft_ident_report::report::json::Document;
+use crate::cli::{CliError, CommandLine, Context, Outcome};
+use cft_ident_report::report::json::JsonDocument;
 
 /// Write the manual pages, cft-ident.1 and one for each command, into a folder.
 #[derive(Debug, Clone, clap::Args)]
@@ -24,7 +24,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 .hint(format!("make it first: mkdir -p {}", args.folder.display())),
         );
     }
-    let mut all = Cli::command();
+    let mut all = CommandLine::command();
     // options of every command are written into each
     all.build();
     let mut pages = vec![("cft-ident".to_owned(), all.clone())];
@@ -50,6 +50,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let result = json!({"files": written});
     Ok(Outcome::new(
         text,
-        Document::new("generate", &[], &[], &result)?,
+        JsonDocument::new("generate", &[], &[], &result)?,
     ))
 }

@@ -18,12 +18,12 @@ Example:
 #[command(after_help = EXAMPLE)]
 pub struct Args {
     #[command(subcommand)]
-    pub what: What,
+    pub what: GeneratedText,
 }
 
 /// The texts that can be generated.
 #[derive(Debug, Clone, clap::Subcommand)]
-pub enum What {
+pub enum GeneratedText {
     Schema(schema::Args),
     Completions(completions::Args),
     Man(man::Args),
@@ -31,8 +31,8 @@ pub enum What {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     match &args.what {
-        What::Schema(args) => schema::run(args),
-        What::Completions(args) => completions::run(args),
-        What::Man(args) => man::run(args, context),
+        GeneratedText::Schema(args) => schema::run(args),
+        GeneratedText::Completions(args) => completions::run(args),
+        GeneratedText::Man(args) => man::run(args, context),
     }
 }

@@ -9,9 +9,9 @@ use crate::cli::{
 };
 use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
-use cft_ident_plant::excite::Judgements;
+use cft_ident_plant::excite::MotionJudgements;
 use cft_ident_plant::simulate::truth::TruthFile;
-use cft_ident_report::report::json::{self, Document};
+use cft_ident_report::report::json::{self, JsonDocument};
 use cft_ident_stages::identify::{
     ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, Payload,
     TorqueAlong, Tracked, Validated, Watched,
@@ -21,7 +21,7 @@ use cft_ident_tool::tool::ToolResult;
 
 /// What a schema is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Kind {
+pub enum SchemaKind {
     /// Robot file (TOML)
     Robot,
     /// Model file (TOML)
@@ -88,40 +88,40 @@ pub enum Kind {
 pub struct Args {
     /// File, or command whose document
     #[arg(value_name = "KIND")]
-    pub kind: Kind,
+    pub kind: SchemaKind,
 }
 
 /// The schema of a kind.
-pub fn schema(kind: Kind) -> Value {
+pub fn schema(kind: SchemaKind) -> Value {
     match kind {
-        Kind::Robot => robot(),
-        Kind::Model => model(),
-        Kind::Campaign => campaign(),
-        Kind::Trajectory => trajectory(),
-        Kind::Truth => serde_json::Value::from(schemars::schema_for!(TruthFile)),
-        Kind::Friction => json::schema::<IdentifiedFriction>("friction"),
-        Kind::Lsq => json::schema::<IdentifiedDynamics>("lsq"),
-        Kind::LsqStatic => json::schema::<GravityFit>("lsq-static"),
-        Kind::Validate => json::schema::<Validated>("validate"),
-        Kind::Reduce => json::schema::<reduce::Reduced>("reduce"),
-        Kind::Track => json::schema::<Tracked>("track"),
-        Kind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
-        Kind::Drive => json::schema::<DriveResult>("drive"),
-        Kind::Compare => json::schema::<ComparisonResult>("compare"),
-        Kind::Identify => json::schema::<identify::Identified>("identify"),
-        Kind::Excite => json::schema::<Judgements>("excite"),
-        Kind::ExciteStatic => json::schema::<excite::held::PosesToHold>("excite-static"),
-        Kind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),
-        Kind::Inspect => json::schema::<inspect::InspectionResult>("inspect"),
-        Kind::Payload => json::schema::<Payload>("payload"),
-        Kind::Tool => json::schema::<ToolResult>("tool"),
-        Kind::Show => json::schema::<show::ShownModel>("show"),
-        Kind::Torque => json::schema::<TorqueAlong>("torque"),
-        Kind::Watch => json::schema::<Watched>("watch"),
-        Kind::Convert => json::schema::<convert::Converted>("convert"),
-        Kind::Export => json::schema::<export::Exported>("export"),
-        Kind::New => json::schema::<new::Drafted>("new"),
-        Kind::Example => json::schema::<example::Examples>("example"),
+        SchemaKind::Robot => robot(),
+        SchemaKind::Model => model(),
+        SchemaKind::Campaign => campaign(),
+        SchemaKind::Trajectory => trajectory(),
+        SchemaKind::Truth => serde_json::Value::from(schemars::schema_for!(TruthFile)),
+        SchemaKind::Friction => json::schema::<IdentifiedFriction>("friction"),
+        SchemaKind::Lsq => json::schema::<IdentifiedDynamics>("lsq"),
+        SchemaKind::LsqStatic => json::schema::<GravityFit>("lsq-static"),
+        SchemaKind::Validate => json::schema::<Validated>("validate"),
+        SchemaKind::Reduce => json::schema::<reduce::ReducedFile>("reduce"),
+        SchemaKind::Track => json::schema::<Tracked>("track"),
+        SchemaKind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
+        SchemaKind::Drive => json::schema::<DriveResult>("drive"),
+        SchemaKind::Compare => json::schema::<ComparisonResult>("compare"),
+        SchemaKind::Identify => json::schema::<identify::StageResults>("identify"),
+        SchemaKind::Excite => json::schema::<MotionJudgements>("excite"),
+        SchemaKind::ExciteStatic => json::schema::<excite::held::PosesToHold>("excite-static"),
+        SchemaKind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),
+        SchemaKind::Inspect => json::schema::<inspect::InspectionResult>("inspect"),
+        SchemaKind::Payload => json::schema::<Payload>("payload"),
+        SchemaKind::Tool => json::schema::<ToolResult>("tool"),
+        SchemaKind::Show => json::schema::<show::ShownModel>("show"),
+        SchemaKind::Torque => json::schema::<TorqueAlong>("torque"),
+        SchemaKind::Watch => json::schema::<Watched>("watch"),
+        SchemaKind::Convert => json::schema::<convert::ConvertedLog>("convert"),
+        SchemaKind::Export => json::schema::<export::ExportedModel>("export"),
+        SchemaKind::New => json::schema::<new::WrittenRobotFile>("new"),
+        SchemaKind::Example => json::schema::<example::ExampleList>("example"),
     }
 }
 
@@ -132,6 +132,6 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let result = serde_json::json!({"kind": name.as_ref().map(|n| n.get_name()), "of": found});
     Ok(Outcome::new(
         text,
-        Document::new("generate", &[], &[], &result)?,
+        JsonDocument::new("generate", &[], &[], &result)?,
     ))
 }

@@ -11,17 +11,17 @@ use serde::Serialize;
 use super::{CliError, Context, Outcome, file_name, inspect, typed};
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::serial_section::LinkSection;
-use cft_ident_files::config::{Capsules, RobotFile, UrdfChain};
+use cft_ident_files::config::{DeclaredCapsules, RobotFile, UrdfChain};
 use cft_ident_logs::inspect::{LogFault, Severity};
 use cft_ident_logs::log::{LogSpec, Provenance, Reader, escape};
 use cft_ident_logs::mapping::{
-    Asked, ClockSource, JointColumns, Known, Mapping, SeenColumns, look,
+    ClockSource, JointColumns, LogHints, Mapping, SeenColumns, UrdfJoint, look,
 };
 use cft_ident_plant::excite::space::always_touching;
-use cft_ident_report::report::json::Document;
-use cft_ident_report::report::table::{Align, Table, hanging};
+use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::table::{CellAlignment, Table, hanging};
 use cft_ident_stages::identify::LoggedRobot;
-use text::Draft;
+use text::DraftInputs;
 
 const EXAMPLE: &str = "\
 Example:
@@ -63,8 +63,9 @@ pub(super) fn rate(text: &str) -> Result<f64, String> {
     rate.ok_or_else(|| "give a number above 0".to_owned())
 }
 
+/// What a drafted robot file describes the robot by.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Shape {
+pub(super) enum DraftShape {
     /// A URDF beside the robot file, by the path that the file will hold.
     Urdf { path: String, tip: Option<String> },
     /// Rows of a table to be filled in.
@@ -75,7 +76,8 @@ pub(super) enum Shape {
 
 /// A robot file that was written.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Drafted {
+#[schemars(rename = "Drafted")]
+pub struct WrittenRobotFile {
     /// Its name.
     file: String,
     /// What the robot is.
@@ -135,7 +137,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let urdf = args.urdf.as_deref().map(Provenance::of_file).transpose()?;
     let log = seen.as_ref().map(|seen| seen.provenance.clone());
     let provenance: Vec<Provenance> = urdf.into_iter().chain(log).collect();
-    let columns = ["joint", "position", "velocity", "torque"].map(|name| (name, Align::Left));
+    let columns =
+        ["joint", "position", "velocity", "torque"].map(|name| (name, CellAlignment::Left));
     let mut table = Table::new(&columns).caption(&format!("written: {place}"));
     for joint in &mapping.joints {
         let found = [&joint.position, &joint.velocity, &joint.torque];
@@ -145,7 +148,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut all = faults.iter().flatten();
     let wrong = all.any(|f| f.severity == Severity::Error);
     let next = match &args.log {
-        _ if found.shape == Shape::Rows => format!(
+        _ if found.shape == DraftShape::Rows => format!(
             "next: fill in the modified Denavit-Hartenberg rows ([[robot.link]]) of {place}\n"
         ),
         None => format!("next: cft-ident inspect LOG -r {place}\n"),
@@ -167,7 +170,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let all: Vec<&String> = mapping.checks.iter().chain(&mapping.torque_check).collect();
     let checks = checks_in_lines(&all);
     let inspected = inspected(faults.as_deref());
-    let result = Drafted {
+    let result = WrittenRobotFile {
         file: file_name(&target),
         model: found.model,
         joints: mapping.joints.clone(),
@@ -183,7 +186,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     Ok(Outcome::new(
         context.text(format!("{table}{checks}{inspected}{next}"), &brief),
-        Document::new("new", &provenance, &warnings, &result)?,
+        JsonDocument::new("new", &provenance, &warnings, &result)?,
     ))
 }
 
@@ -195,12 +198,12 @@ fn joint_name(target: &Path) -> String {
 }
 
 /// A robot file as it was drafted.
-pub(super) struct Described {
+pub(super) struct RobotDraft {
     pub text: String,
     pub file: RobotFile,
     pub mapping: Mapping,
     pub seen: Option<SeenColumns>,
-    shape: Shape,
+    shape: DraftShape,
     model: &'static str,
     cutoff_hz: Option<f64>,
     /// The command that describes the arm alone, whose joints the log has.
@@ -208,7 +211,7 @@ pub(super) struct Described {
     pub warnings: Vec<String>,
 }
 
-impl Described {
+impl RobotDraft {
     /// What is a guess, each with the line to change.
     pub fn guesses(&self) -> Vec<String> {
         let mapping = &self.mapping;
@@ -243,14 +246,14 @@ pub(super) fn describe(
     args: &Args,
     target: &Path,
     context: &Context,
-) -> Result<Described, CliError> {
+) -> Result<RobotDraft, CliError> {
     let urdf = args.urdf.as_deref();
     let chain = urdf.map(|path| UrdfChain::load(path, args.tip.as_deref()));
     let chain = chain.transpose()?;
     let both = chain.as_ref().zip(urdf);
     let capsules = both.map(|(chain, path)| chain.capsules(path));
-    let known: Option<Vec<Known>> = chain.as_ref().map(joints_of);
-    let asked = Asked {
+    let known: Option<Vec<UrdfJoint>> = chain.as_ref().map(joints_of);
+    let asked = LogHints {
         rate_hz: args.rate,
         topic: args.topic.clone(),
     };
@@ -267,14 +270,14 @@ pub(super) fn describe(
         alone.joint = joint_name(target);
     }
     let shape = match (&args.urdf, mapping.joints.len()) {
-        (Some(path), _) => Shape::Urdf {
+        (Some(path), _) => DraftShape::Urdf {
             path: beside(path, target),
             tip: args.tip.clone(),
         },
-        (None, 0 | 1) => Shape::Single(mapping.kind()),
-        (None, _) => Shape::Rows,
+        (None, 0 | 1) => DraftShape::Single(mapping.kind()),
+        (None, _) => DraftShape::Rows,
     };
-    let mut draft = Draft {
+    let mut draft = DraftInputs {
         name: escape(&target.file_stem().unwrap_or_default().to_string_lossy()),
         shape,
         mapping: &mapping,
@@ -285,7 +288,7 @@ pub(super) fn describe(
     };
     // what is written must be readable, and the log by it
     let folder = target.parent();
-    let read = |draft: &Draft| {
+    let read = |draft: &DraftInputs| {
         // rows that are to be filled in are read as if they were
         let filled = draft.text().replace("= nan ", "= 1.0 ");
         RobotFile::parse_in(&target.display().to_string(), &filled, folder)
@@ -329,7 +332,7 @@ pub(super) fn describe(
         ));
     }
     let (shape, model, cutoff_hz) = (draft.shape.clone(), draft.model(), draft.cutoff_hz());
-    Ok(Described {
+    Ok(RobotDraft {
         text,
         file,
         shape,
@@ -362,7 +365,7 @@ fn arm_alone(chain: &UrdfChain, mapping: &Mapping, args: &Args) -> Option<String
     let tip = chain.links.iter().find(of_last)?.name.as_ref()?;
     let (urdf, log) = (args.urdf.as_ref()?, args.log.as_ref()?);
     let arm = UrdfChain::load(urdf, Some(tip)).ok()?;
-    let joints: Vec<Known> = joints_of(&arm);
+    let joints: Vec<UrdfJoint> = joints_of(&arm);
     let same = joints.iter().map(|joint| joint.name.as_str()).eq(logged);
     same.then(|| {
         format!(
@@ -392,7 +395,7 @@ fn checks_in_lines(checks: &[&String]) -> String {
 }
 
 /// The collision shapes that no capsule holds, in one sentence.
-fn unheld(capsules: &Capsules) -> Option<String> {
+fn unheld(capsules: &DeclaredCapsules) -> Option<String> {
     let (first, more) = capsules.reasons.split_at(capsules.reasons.len().min(2));
     let more = match more.len() {
         0 => String::new(),
@@ -444,11 +447,11 @@ fn inspected(faults: Option<&[LogFault]>) -> String {
 }
 
 /// The independent joints of a URDF, their kinds and their largest torques.
-fn joints_of(chain: &UrdfChain) -> Vec<Known> {
+fn joints_of(chain: &UrdfChain) -> Vec<UrdfJoint> {
     let of = |link: &LinkSection| {
         let name = link.joint.clone()?;
         let limits = chain.limits.iter().find(|(joint, _)| *joint == name);
-        Some(Known {
+        Some(UrdfJoint {
             kind: link.kind.unwrap_or(JointKind::Revolute),
             torque: limits.and_then(|(_, limits)| limits.torque),
             name,

@@ -2,21 +2,22 @@
 
 use std::fmt::Write;
 
-use super::Shape;
+use super::DraftShape;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
-use cft_ident_files::config::{Capsules, UrdfChain};
+use cft_ident_files::config::{DeclaredCapsules, UrdfChain};
 use cft_ident_logs::log::{escape, list};
 use cft_ident_logs::mapping::{ClockSource, JointColumns, Mapping, SeenColumns};
 
-pub(super) struct Draft<'a> {
+/// What a draft is written from.
+pub(super) struct DraftInputs<'a> {
     pub name: String,
-    pub shape: Shape,
+    pub shape: DraftShape,
     pub mapping: &'a Mapping,
     pub seen: Option<&'a SeenColumns>,
     pub chain: Option<&'a UrdfChain>,
     /// About the collision shapes of the URDF.
-    pub capsules: Capsules,
+    pub capsules: DeclaredCapsules,
     /// Pairs of links whose capsules overlap in every pose.
     pub touching: Vec<[String; 2]>,
 }
@@ -35,12 +36,12 @@ fn key(text: &str) -> String {
     }
 }
 
-impl Draft<'_> {
+impl DraftInputs<'_> {
     /// `[robot] model`.
     pub(super) fn model(&self) -> &'static str {
         match self.shape {
-            Shape::Single(_) => "single-joint",
-            Shape::Urdf { .. } | Shape::Rows => "serial",
+            DraftShape::Single(_) => "single-joint",
+            DraftShape::Urdf { .. } | DraftShape::Rows => "serial",
         }
     }
 
@@ -103,7 +104,7 @@ impl Draft<'_> {
         if let Some(name) = chain.links.last().and_then(|link| link.name.as_deref()) {
             let _ = writeln!(out, "# link = {}\n# xyz = [0.0, 0.0, 0.1]", quoted(name));
         }
-        let Capsules {
+        let DeclaredCapsules {
             sections, without, ..
         } = &self.capsules;
         if !without.is_empty() {
@@ -147,7 +148,7 @@ impl Draft<'_> {
         let serial = "# gravity = [0.0, 0.0, -9.81]   # free fall in the frame of the base; turn it where the base is tilted\n\
                       # drive_inertia = false         # where torques are measured behind the gears, on the link side\n";
         match &self.shape {
-            Shape::Urdf { path, tip } => {
+            DraftShape::Urdf { path, tip } => {
                 let _ = writeln!(
                     out,
                     "urdf = {}   # from the folder of this file",
@@ -159,7 +160,7 @@ impl Draft<'_> {
                 });
                 out.push_str(serial);
             }
-            Shape::Single(kind) => {
+            DraftShape::Single(kind) => {
                 let first = self.mapping.joints.first();
                 let name = first.map_or("q1", |j| j.joint.as_str());
                 let (kind, why) = match kind {
@@ -176,7 +177,7 @@ impl Draft<'_> {
                     quoted(kind)
                 );
             }
-            Shape::Rows => {
+            DraftShape::Rows => {
                 out.push_str(serial);
                 out.push_str(
                     "\n# TO BE FILLED IN: a row of the modified Denavit-Hartenberg table (Craig) for each joint: alpha and\n\

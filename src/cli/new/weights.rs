@@ -17,7 +17,7 @@ const OFF: f64 = 3.0;
 
 /// Sums of one joint: rows, torque, weight, and their products.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct WeightSums {
     n: f64,
     tau: f64,
     g: f64,
@@ -26,7 +26,7 @@ struct Sums {
     tau_g: f64,
 }
 
-impl Sums {
+impl WeightSums {
     fn add(&mut self, tau: f64, g: f64) {
         self.n += 1.0;
         self.tau += tau;
@@ -77,7 +77,7 @@ pub(super) fn warning(
     let n = robot.joints();
     let rest = vec![0.0; n];
     let mut y = vec![0.0; n * theta.len()];
-    let mut sums = vec![Sums::default(); n];
+    let mut sums = vec![WeightSums::default(); n];
     let Ok(mut reader) = Reader::open(spec, &file.layout()) else {
         return Ok(None);
     };

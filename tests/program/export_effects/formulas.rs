@@ -36,31 +36,31 @@ const FORMULAS: [[&str; 3]; 6] = [
     ],
 ];
 
-fn own_formulas(robot: &Robot) -> Vec<Added> {
-    let definition = Definition {
+fn own_formulas(robot: &Robot) -> Vec<ModelEffect> {
+    let definition = FormulaDefinition {
         name: "all-functions".to_owned(),
         coefficients: FORMULAS.iter().map(|c| c.map(str::to_owned)).collect(),
-        shapes: vec![Shape {
+        shapes: vec![FormulaShape {
             name: "w".to_owned(),
             unit: "s/rad".to_owned(),
             range: [1.0, 90.0],
         }],
-        ..Definition::default()
+        ..FormulaDefinition::default()
     };
     let law = own::law(&definition, robot).unwrap();
     let at = |j: usize, w: f64| {
         let linear = (0..law.linear.len()).map(|i| 0.9 - 0.27 * i as f64);
-        Added::new(law, Place::Joint(j), vec![w], linear.collect())
+        ModelEffect::new(law, EffectPlace::Joint(j), vec![w], linear.collect())
     };
     vec![at(0, 12.0), at(3, 70.0)]
 }
 
 /// A model with one formula at its second joint, along a motion in which every drive warms up.
 fn warm(robot: &Robot, name: &str, formula: &str) -> Case {
-    let definition = Definition {
+    let definition = FormulaDefinition {
         name: name.to_owned(),
         coefficients: vec![["c".to_owned(), "Nm".to_owned(), formula.to_owned()]],
-        ..Definition::default()
+        ..FormulaDefinition::default()
     };
     let law = own::law(&definition, robot).unwrap();
     let mut along = swing(robot.joints());
@@ -70,7 +70,12 @@ fn warm(robot: &Robot, name: &str, formula: &str) -> Case {
     Case {
         name: name.to_owned(),
         model: AugmentedModel {
-            effects: vec![Added::new(law, Place::Joint(1), Vec::new(), vec![0.7])],
+            effects: vec![ModelEffect::new(
+                law,
+                EffectPlace::Joint(1),
+                Vec::new(),
+                vec![0.7],
+            )],
             model: model(robot.clone()),
         },
         along,

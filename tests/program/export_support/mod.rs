@@ -1,6 +1,6 @@
 //! Exported code, compiled and run along motions that are handed over as a file of numbers.
 
-use cft_ident::effect::{self, Added, AugmentedModel};
+use cft_ident::effect::{self, AugmentedModel, ModelEffect};
 use cft_ident::export::{self, Note, Program};
 use cft_ident::motion::Stretch;
 use cft_ident::robot::Robot;
@@ -83,7 +83,12 @@ pub fn model(robot: Robot) -> Model {
 }
 
 /// An effect with the numbers given, as a model file has it.
-pub fn named(robot: &Robot, name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> Added {
+pub fn named(
+    robot: &Robot,
+    name: &str,
+    joint: Option<&str>,
+    numbers: &[(&str, f64)],
+) -> ModelEffect {
     let given: BTreeMap<String, f64> = numbers
         .iter()
         .map(|(key, value)| ((*key).to_owned(), *value))

@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn logs_as_they_were_measured_have_none_of_these_faults() {
     for log in all() {
-        for depth in [Depth::Gate, Depth::Whole] {
+        for depth in [InspectionDepth::Gate, InspectionDepth::Whole] {
             let found = log.judged(depth);
             for fault in &found.faults {
                 assert!(!OF_ROWS.contains(&fault.kind), "{}: {fault:?}", log.name);

@@ -1,17 +1,17 @@
 //! Everything that a model may lack, each shape of it a candidate with columns of its own.
 
-use super::problem::case::Case;
-pub use super::problem::pass::Candidate;
+use super::problem::case::DiagnosisCase;
+pub use super::problem::pass::EffectCandidate;
 use crate::effect::{
-    Added, AugmentedModel, Cover, Family, LAWS, Law, Number, Place, Role, Rule, Search, Seen,
-    ShapeSpan,
+    AugmentedModel, EffectPlace, Family, LAWS, Law, LimitContext, LimitedNumber, LogCoverage,
+    ModelEffect, Role, Rule, ShapeSearch, ShapeSpan,
 };
 use crate::judge::Bound;
 use crate::number;
 
 /// Whether two effects may not both be added: one shape per family and place, and one wave per order.
-pub fn exclude(a: &Added, b: &Added) -> bool {
-    let waves = |e: &Added| e.law.entry.search == Search::Orders;
+pub fn exclude(a: &ModelEffect, b: &ModelEffect) -> bool {
+    let waves = |e: &ModelEffect| e.law.entry.search == ShapeSearch::Orders;
     match a.place == b.place && a.family() == b.family() {
         true if waves(a) && waves(b) => a.name() == b.name() && close(&a.shape, &b.shape),
         same => same,
@@ -27,8 +27,8 @@ fn close(a: &[f64], b: &[f64]) -> bool {
 }
 
 /// Whether an effect is of a joint's declared friction law: its shape, or what stands beside it.
-pub fn is_friction_law(effect: &Added) -> bool {
-    let joint = matches!(effect.place, Place::Joint(_));
+pub fn is_friction_law(effect: &ModelEffect) -> bool {
+    let joint = matches!(effect.place, EffectPlace::Joint(_));
     joint && matches!(effect.family(), Family::Velocity | Family::Offset)
 }
 
@@ -36,16 +36,16 @@ pub fn is_friction_law(effect: &Added) -> bool {
 #[derive(Clone)]
 pub struct NotTried {
     pub law: &'static Law,
-    pub place: Place,
+    pub place: EffectPlace,
     pub lacking: String,
 }
 
 /// All candidates beside a model, and what these data cannot show.
 pub fn candidates(
     model: &AugmentedModel,
-    case: &Case,
-    cover: &Cover,
-) -> (Vec<Candidate>, Vec<NotTried>) {
+    case: &DiagnosisCase,
+    cover: &LogCoverage,
+) -> (Vec<EffectCandidate>, Vec<NotTried>) {
     let robot = &model.model.robot;
     let laws = LAWS.iter().copied().chain(case.own.iter().copied());
     let wanted = |law: &&Law| {
@@ -83,23 +83,28 @@ pub fn candidates(
 }
 
 /// Two joints couple where they are neighbours.
-fn beside(place: Place) -> bool {
+fn beside(place: EffectPlace) -> bool {
     match place {
-        Place::Pair { on, of } => on.abs_diff(of) == 1,
-        Place::Geared { motor, other } => motor.abs_diff(other) == 1,
+        EffectPlace::Pair { on, of } => on.abs_diff(of) == 1,
+        EffectPlace::Geared { motor, other } => motor.abs_diff(other) == 1,
         _ => true,
     }
 }
 
 /// Whether the model has the effect already; only waves come more than once.
-fn known(model: &AugmentedModel, law: &Law, place: Place) -> bool {
+fn known(model: &AugmentedModel, law: &Law, place: EffectPlace) -> bool {
     let mut effects = model.effects.iter();
-    law.entry.search != Search::Orders
+    law.entry.search != ShapeSearch::Orders
         && effects.any(|e| e.name() == law.entry.name && e.place == place)
 }
 
-fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> Option<Candidate> {
-    let effect = Added::new(law, place, shape, vec![1.0; law.linear.len()]);
+fn candidate(
+    law: &'static Law,
+    place: EffectPlace,
+    shape: Vec<f64>,
+    seen: &LimitContext,
+) -> Option<EffectCandidate> {
+    let effect = ModelEffect::new(law, place, shape, vec![1.0; law.linear.len()]);
     // what hangs on coefficients is a bound of the fit, what hangs on the shape alone a limit of the grid
     let twice = vec![2.0; law.linear.len()];
     let value = |linear: &[f64], key: &str| {
@@ -107,18 +112,18 @@ fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> O
         keys.iter().find(|k| k.key == key).map(|k| k.value)
     };
     let coefficient = |key: &str| value(&effect.linear, key) != value(&twice, key);
-    let of_coefficients = |number: &Number| match number {
-        Number::Key(key) | Number::Size(key) => coefficient(key),
-        Number::Amplitude(..) | Number::AtTopSpeed(..) => true,
+    let of_coefficients = |number: &LimitedNumber| match number {
+        LimitedNumber::Key(key) | LimitedNumber::Size(key) => coefficient(key),
+        LimitedNumber::Amplitude(..) | LimitedNumber::AtTopSpeed(..) => true,
         // of coefficients that are all one they are the shape's
-        Number::Ratio(..) | Number::Weight => false,
+        LimitedNumber::Ratio(..) | LimitedNumber::Weight => false,
     };
     let broken = effect.broken(seen, &|rule| of_coefficients(&rule.of));
     let bounds = law.linear.iter().map(|key| bound(&effect, key, seen));
     let bounds = bounds.collect();
     let linear = vec![0.0; law.linear.len()];
-    broken.is_none().then_some(Candidate {
-        effect: Added { linear, ..effect },
+    broken.is_none().then_some(EffectCandidate {
+        effect: ModelEffect { linear, ..effect },
         bounds,
         slopes: Vec::new(),
     })
@@ -127,9 +132,9 @@ fn candidate(law: &'static Law, place: Place, shape: Vec<f64>, seen: &Seen) -> O
 /// Shapes that are refined, with how far each may go from where it is.
 pub fn refined_shapes(
     model: &AugmentedModel,
-    case: &Case,
-    cover: &Cover,
-    effect: &Added,
+    case: &DiagnosisCase,
+    cover: &LogCoverage,
+    effect: &ModelEffect,
 ) -> Vec<(usize, Bound)> {
     let ranges = shape_ranges(model, case, cover, effect).into_iter();
     let of = |(k, range): (usize, ShapeSpan)| {
@@ -146,9 +151,9 @@ pub fn refined_shapes(
 /// Ranges of the shapes that are refined, within what its numbers must be.
 fn shape_ranges(
     model: &AugmentedModel,
-    case: &Case,
-    cover: &Cover,
-    effect: &Added,
+    case: &DiagnosisCase,
+    cover: &LogCoverage,
+    effect: &ModelEffect,
 ) -> Vec<ShapeSpan> {
     let law = effect.law;
     let seen = seen(model, cover, case, effect.place);
@@ -164,9 +169,9 @@ fn shape_ranges(
 /// the law is another or nothing is left of it; it has no torque; or its numbers together are none that a machine has.
 pub fn no_finding(
     model: &AugmentedModel,
-    case: &Case,
-    cover: &Cover,
-    effect: &Added,
+    case: &DiagnosisCase,
+    cover: &LogCoverage,
+    effect: &ModelEffect,
 ) -> Option<String> {
     let law = effect.law;
     if effect.linear.iter().all(|x| *x == 0.0) || !effect.can_be() {
@@ -185,20 +190,25 @@ pub fn no_finding(
     }
     let seen = seen(model, cover, case, effect.place);
     // an amplitude beyond its usual size is told as large, and is there; bounds of single numbers are those of the fit
-    let told = |rule: &Rule| matches!(rule.of, Number::Amplitude(..) | Number::Key(_));
+    let told = |rule: &Rule| {
+        matches!(
+            rule.of,
+            LimitedNumber::Amplitude(..) | LimitedNumber::Key(_)
+        )
+    };
     effect.broken(&seen, &told).map(|(_, why)| why)
 }
 
 /// Values that a coefficient can have.
-fn bound(effect: &Added, key: &str, seen: &Seen) -> Bound {
+fn bound(effect: &ModelEffect, key: &str, seen: &LimitContext) -> Bound {
     let mut bound = Bound::NONE;
     for rule in effect.law.entry.must {
         match rule.of {
-            Number::Key(of) if of == key => {
+            LimitedNumber::Key(of) if of == key => {
                 bound.least = rule.least_of(seen).unwrap_or(bound.least);
                 bound.most = rule.most_of(seen).unwrap_or(bound.most);
             }
-            Number::Size(of) if of == key => {
+            LimitedNumber::Size(of) if of == key => {
                 if let Some(most) = rule.most_of(seen) {
                     (bound.least, bound.most) = (-most, most);
                 }
@@ -207,16 +217,21 @@ fn bound(effect: &Added, key: &str, seen: &Seen) -> Bound {
         }
     }
     // one clock may be late or early; the torque of one joint is not ahead of its position
-    if effect.law.entry.role == Role::Shift && effect.place != Place::All {
+    if effect.law.entry.role == Role::Shift && effect.place != EffectPlace::All {
         bound.least = 0.0;
     }
     bound
 }
 
 /// What limits refer to at a place; the first joint's for all of them.
-fn seen<'a>(model: &'a AugmentedModel, cover: &'a Cover, case: &'a Case, place: Place) -> Seen<'a> {
+fn seen<'a>(
+    model: &'a AugmentedModel,
+    cover: &'a LogCoverage,
+    case: &'a DiagnosisCase,
+    place: EffectPlace,
+) -> LimitContext<'a> {
     let j = place.joint().unwrap_or(0);
-    Seen {
+    LimitContext {
         cover: cover.at(place),
         duration_s: cover.duration_s,
         kind: place.kind(&model.model.robot),

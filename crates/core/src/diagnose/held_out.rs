@@ -2,16 +2,16 @@
 
 use super::error::DiagnoseError;
 use super::outcome::SplitErrors;
-use super::problem::case::Case;
+use super::problem::case::DiagnosisCase;
 use super::problem::data_split::{DataSplit, LogRole};
-use super::unexplained::errors::{self, Errors, JointChange, Pieces};
+use super::unexplained::errors::{self, ErrorsByPiece, JointChange, UseErrors};
 use crate::effect::AugmentedModel;
 use crate::motion::MotionError;
 
 /// Rows of one use on which models are compared.
 #[derive(Clone, Copy)]
 pub struct HeldOutRows<'a> {
-    pub case: &'a Case,
+    pub case: &'a DiagnosisCase,
     pub split: &'a DataSplit,
     pub role: LogRole,
     /// Without those in which friction at rest takes whatever the torque is.
@@ -22,7 +22,7 @@ pub struct HeldOutRows<'a> {
 
 /// Errors of a model on fitted and held-out rows, neighbouring pieces drawn together so many at a time.
 pub fn split_errors(
-    (case, split, together): (&Case, &DataSplit, usize),
+    (case, split, together): (&DiagnosisCase, &DataSplit, usize),
     model: &AugmentedModel,
 ) -> Result<SplitErrors, DiagnoseError> {
     let of = |role| HeldOutRows::of((case, split, together), role);
@@ -45,7 +45,10 @@ pub struct EffectChange {
 }
 
 impl<'a> HeldOutRows<'a> {
-    pub fn of((case, split, together): (&'a Case, &'a DataSplit, usize), role: LogRole) -> Self {
+    pub fn of(
+        (case, split, together): (&'a DiagnosisCase, &'a DataSplit, usize),
+        role: LogRole,
+    ) -> Self {
         HeldOutRows {
             case,
             split,
@@ -55,12 +58,12 @@ impl<'a> HeldOutRows<'a> {
         }
     }
 
-    fn pieces(&self, model: &AugmentedModel) -> Result<Pieces, MotionError> {
+    fn pieces(&self, model: &AugmentedModel) -> Result<ErrorsByPiece, MotionError> {
         errors::pieces(model, self.case, self.split, (self.role, self.moving))
     }
 
     /// Errors of a model; none where there are no such rows.
-    pub fn errors(&self, model: &AugmentedModel) -> Result<Option<Errors>, MotionError> {
+    pub fn errors(&self, model: &AugmentedModel) -> Result<Option<UseErrors>, MotionError> {
         let pieces = self.pieces(model)?;
         Ok(errors::summed(self.case, (&pieces, self.together)))
     }

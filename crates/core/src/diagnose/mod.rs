@@ -32,20 +32,20 @@ mod watch;
 
 pub use error::DiagnoseError;
 pub use outcome::{
-    Diagnosis, FormulaEnd, FormulaPicture, FoundEffect, FoundFormula, FrictionChange,
-    LeftCandidate, NotWritten, SplitErrors, StepStatus, Symmetry,
+    Diagnosis, FormulaEnd, FormulaPicture, FormulaSymmetry, FoundEffect, FoundFormula,
+    FrictionChange, LeftCandidate, NotWritten, SplitErrors, StepStatus,
 };
-pub use problem::case::{Case, Wishes};
+pub use problem::case::{DiagnosisCase, DiagnosisOptions};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::formula_numbers::{FORMULA_NUMBERS, FormulaNumbers};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown, value_of};
 pub use refit::{ModelProposal, ModelRefit};
 pub use run::diagnose;
-pub use unexplained::Unexplained;
-pub use unexplained::dependence::Dependence;
-pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};
+pub use unexplained::UnexplainedResidual;
+pub use unexplained::dependence::SignalDependence;
+pub use unexplained::errors::{JointChange, JointErrors, OverallErrors, UseErrors};
 pub use unexplained::evidence::{JointEvidence, evidence, one_after_the_other};
 pub use unexplained::map::ResidualMap;
 pub use unexplained::signal::Signal;
-pub use watch::{Heard, Watch};
+pub use watch::{DiagnosisProgress, DiagnosisWatch};

@@ -2,7 +2,7 @@
 //! friction start: of the raw residual, for a ripple dies in a decimating filter, and of the
 //! filtered one at full rate, where a strong order beyond the band does not hide a weaker one in it.
 
-use crate::effect::{Cover, JointCover};
+use crate::effect::{JointCover, LogCoverage};
 use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::JointKind;
 
@@ -17,7 +17,7 @@ const MIN_WAVES: f64 = 1.5;
 
 /// Fills the orders of a cover from the raw residuals of a model, `[stretch][joint][sample]`.
 pub fn find(
-    cover: &mut Cover,
+    cover: &mut LogCoverage,
     residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
     filters: &ParallelFilters,

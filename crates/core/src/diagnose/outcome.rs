@@ -6,12 +6,12 @@ use serde::Serialize;
 
 use super::problem::data_split::SetAside;
 use super::problem::unknowns::Unknown;
-use super::unexplained::Unexplained;
-use super::unexplained::dependence::Dependence;
-use super::unexplained::errors::{Errors, JointChange};
+use super::unexplained::UnexplainedResidual;
+use super::unexplained::dependence::SignalDependence;
+use super::unexplained::errors::{JointChange, UseErrors};
 use super::unexplained::signal::Signal;
-use crate::effect::formula::Definition;
-use crate::effect::{Added, AugmentedModel, Law, Place};
+use crate::effect::formula::FormulaDefinition;
+use crate::effect::{AugmentedModel, EffectPlace, Law, ModelEffect};
 use crate::judge::ErrorGain;
 use crate::robot::FormulaSignal;
 
@@ -45,7 +45,7 @@ pub enum NotWritten {
 #[derive(Debug, Clone)]
 pub struct FoundEffect {
     /// With the amplitude of the joint fit of all effects that stand; of one that does not, of the fit of these and it.
-    pub estimate: Added,
+    pub estimate: ModelEffect,
     /// Covariance of its (shape, linear), row-major; a shape that is not free has none.
     pub covariance: Vec<f64>,
     /// Its place in the effects of the model that is written.
@@ -68,7 +68,7 @@ pub struct FoundEffect {
     /// Part of the squared error of these blocks that it takes off.
     pub share: f64,
     /// Effects that these data do not separate from it, best first.
-    pub alternatives: Vec<Added>,
+    pub alternatives: Vec<ModelEffect>,
     /// Mean relative error on held-out data without and with it.
     pub holdout: Option<[f64; 2]>,
     /// The same joint by joint.
@@ -90,9 +90,9 @@ impl FoundEffect {
 #[derive(Debug, Clone)]
 pub struct LeftCandidate {
     pub law: &'static Law,
-    pub place: Place,
+    pub place: EffectPlace,
     /// In its best shape; none where it was not tried.
-    pub effect: Option<Added>,
+    pub effect: Option<ModelEffect>,
     /// Part of the squared error of blocks left out that it would take off.
     pub score: Option<f64>,
     pub reason: String,
@@ -101,8 +101,8 @@ pub struct LeftCandidate {
 /// Errors on the logs that were fitted and on held-out data.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SplitErrors {
-    pub train: Errors,
-    pub holdout: Option<Errors>,
+    pub train: UseErrors,
+    pub holdout: Option<UseErrors>,
 }
 
 /// Change of a joint's friction from a time on.
@@ -138,14 +138,14 @@ pub struct FoundFormula {
     pub joint: usize,
     pub end: FormulaEnd,
     /// As an effect of the user's own.
-    pub definition: Definition,
+    pub definition: FormulaDefinition,
     /// Its numbers, with what the judge says of it.
     pub step: FoundEffect,
     /// Chance of a gain as large where whole parts of the residual have another sign.
     pub p_value: f64,
     /// Part of the squared error of blocks left out that it takes off.
     pub share: f64,
-    pub symmetry: Symmetry,
+    pub symmetry: FormulaSymmetry,
     /// What its terms are functions of.
     pub signals: Vec<(FormulaSignal, usize)>,
     /// None where it is not sure enough, or nothing is held out.
@@ -153,12 +153,13 @@ pub struct FoundFormula {
     /// Root mean square of the residual without and with it within 0.1 s of a reversal, on the same data.
     pub at_reversals: Option<[f64; 2]>,
     /// Effects of the catalogue at the joint in whose place it stands.
-    pub in_place_of: Vec<Added>,
+    pub in_place_of: Vec<ModelEffect>,
 }
 
 /// Parts of what a formula adds, by its terms' squares.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Symmetry {
+#[schemars(rename = "Symmetry")]
+pub struct FormulaSymmetry {
     /// It flips where the motion is reversed: friction.
     pub odd: f64,
     /// It goes round with the joint's position: a transmission.
@@ -180,9 +181,9 @@ pub struct FormulaPicture {
 /// What a model leaves of the torques.
 #[derive(Debug, Clone)]
 pub struct WhatIsLeft {
-    pub unexplained: Vec<Unexplained>,
+    pub unexplained: Vec<UnexplainedResidual>,
     /// What the residuals of joints with structure depend on, the strongest of each joint first.
-    pub dependence: Vec<Dependence>,
+    pub dependence: Vec<SignalDependence>,
     /// Part of the structure of each joint's residual that is unexplained on the fitted logs.
     pub part_unexplained: Vec<f64>,
 }
@@ -206,7 +207,7 @@ pub struct Diagnosis {
     pub candidates: Vec<LeftCandidate>,
     pub before: SplitErrors,
     /// The declared model refitted to these logs, with nothing added.
-    pub refitted: Errors,
+    pub refitted: UseErrors,
     /// With every effect that stood before held-out data had a say.
     pub after: SplitErrors,
     /// By the model that is written, where held-out data took something out of it.
@@ -237,7 +238,11 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// Whether something is missing yet: more than a little is left above the noise, or friction changes over time.
     pub fn incomplete(&self) -> bool {
-        self.left.unexplained.iter().any(Unexplained::matters) || !self.changes.is_empty()
+        self.left
+            .unexplained
+            .iter()
+            .any(UnexplainedResidual::matters)
+            || !self.changes.is_empty()
     }
 
     /// Joints whose residual still holds structure.
@@ -265,4 +270,23 @@ impl Diagnosis {
     pub fn long_enough(&self) -> bool {
         self.blocks >= self.least_blocks
     }
+}
+
+/// What is made of the effects that were chosen.
+#[derive(Clone)]
+pub struct JudgedEffects {
+    pub steps: Vec<FoundEffect>,
+    /// With the declared numbers by the judge's sums; the given model where nothing is written.
+    pub proposed: AugmentedModel,
+    /// As torques are computed, before held-out data took anything out.
+    pub judge: AugmentedModel,
+    /// As torques are computed; the given model where nothing is left.
+    pub written: AugmentedModel,
+    /// The joint fit with every effect that stands.
+    pub estimates: AugmentedModel,
+    pub covariance: DMatrix<f64>,
+    /// What the effects' amplitudes add to the covariance of the unknowns.
+    pub by_effects: DMatrix<f64>,
+    /// From the unknowns beside the parts of effects that predict to those beside whole ones.
+    pub to_estimate: DVector<f64>,
 }

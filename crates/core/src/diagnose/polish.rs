@@ -3,10 +3,10 @@
 
 use nalgebra::DVector;
 
-use super::candidates::{Candidate, refined_shapes};
-use super::prepared::{PreparedCase, Summed, moved};
-use super::search::Chosen;
-use crate::effect::{Added, AugmentedModel};
+use super::candidates::{EffectCandidate, refined_shapes};
+use super::prepared::{PreparedCase, SummedProducts, moved};
+use super::search::ChosenCandidate;
+use crate::effect::{AugmentedModel, ModelEffect};
 use crate::judge::Term;
 use crate::motion::MotionError;
 
@@ -18,8 +18,8 @@ const HALVED: usize = 4;
 
 /// A fit of chosen effects in some shape.
 struct Point {
-    summed: Summed,
-    candidates: Vec<Candidate>,
+    summed: SummedProducts,
+    candidates: Vec<EffectCandidate>,
     /// Of the declared unknowns, then of every coefficient.
     values: DVector<f64>,
     squares: f64,
@@ -31,11 +31,11 @@ impl PreparedCase<'_> {
     /// Moves the shapes of chosen candidates to where all blocks want them: sums of these alone, about the model fitted with them.
     pub fn polished(
         &self,
-        candidates: &mut [Candidate],
-        summed: &Summed,
-        chosen: &[Chosen],
-        directions: &[Added],
-    ) -> Result<Summed, MotionError> {
+        candidates: &mut [EffectCandidate],
+        summed: &SummedProducts,
+        chosen: &[ChosenCandidate],
+        directions: &[ModelEffect],
+    ) -> Result<SummedProducts, MotionError> {
         let field = self.field(candidates, summed);
         let values = field.terms(chosen).fit(&field.total(), &[]).values;
         let mut list = candidates.to_vec();
@@ -72,8 +72,8 @@ impl PreparedCase<'_> {
     fn better(
         &self,
         from: &Point,
-        chosen: &[Chosen],
-        directions: &[Added],
+        chosen: &[ChosenCandidate],
+        directions: &[ModelEffect],
     ) -> Result<Option<Point>, MotionError> {
         let about = moved(&from.summed.about, &self.unknowns, &from.values);
         let mut part = 1.0;
@@ -92,11 +92,11 @@ impl PreparedCase<'_> {
     /// Candidates with the amplitudes of a fit, a step on.
     fn there(
         &self,
-        list: &[Candidate],
-        chosen: &[Chosen],
+        list: &[EffectCandidate],
+        chosen: &[ChosenCandidate],
         values: &DVector<f64>,
         step: &[f64],
-    ) -> Vec<Candidate> {
+    ) -> Vec<EffectCandidate> {
         let mut list = list.to_vec();
         let (mut at, mut steps) = (self.unknowns.len(), step.iter());
         for c in chosen {
@@ -116,23 +116,23 @@ impl PreparedCase<'_> {
     fn point(
         &self,
         about: AugmentedModel,
-        candidates: Vec<Candidate>,
-        (chosen, directions): (&[Chosen], &[Added]),
+        candidates: Vec<EffectCandidate>,
+        (chosen, directions): (&[ChosenCandidate], &[ModelEffect]),
     ) -> Result<Point, MotionError> {
         // a law that is chosen gives the direction in its present shape
-        let present = |d: &Added| {
+        let present = |d: &ModelEffect| {
             let mut own = chosen.iter().map(|c| &candidates[c.candidate].effect);
             let own = own.find(|e| e.name() == d.name() && e.place == d.place);
             let mut direction = own.unwrap_or(d).clone();
             direction.linear.fill(0.0);
             direction
         };
-        let directions: Vec<Added> = directions.iter().map(present).collect();
+        let directions: Vec<ModelEffect> = directions.iter().map(present).collect();
         let summed = self.summed(about, &candidates, &directions)?;
         let field = self.field(&candidates, &summed);
         let (total, terms) = (field.total(), field.terms(chosen));
         let fit = terms.fit(&total, &[]);
-        let slopes = |c: &Chosen| summed.layout.slopes[c.candidate].clone();
+        let slopes = |c: &ChosenCandidate| summed.layout.slopes[c.candidate].clone();
         let slopes: Vec<Term> = chosen.iter().flat_map(slopes).collect();
         let all = terms.with(&slopes).fit(&total, &[]).values;
         Ok(Point {

@@ -9,26 +9,26 @@ use super::held_out::{HeldOutRows, split_errors};
 use super::memory::memory_s;
 use super::orders;
 use super::outcome::SplitErrors;
-use super::problem::case::Case;
+use super::problem::case::DiagnosisCase;
 use super::problem::data_split::{DataSplit, LogRole, Piece};
-use super::problem::fit::{Fitted, fit};
-use super::problem::pass::{ColumnLayout, Data};
-use super::problem::unknowns::{Unknowns, step};
+use super::problem::fit::{WeightedModel, fit};
+use super::problem::pass::{ColumnLayout, WeightedRows};
+use super::problem::unknowns::{DiagnosisUnknowns, step};
 use super::refit::ModelRefit;
-use super::unexplained::errors::Errors;
-use crate::effect::{Added, AugmentedModel, Cover};
+use super::unexplained::errors::UseErrors;
+use crate::effect::{AugmentedModel, LogCoverage, ModelEffect};
 use crate::judge::{BlockSums, Blocks, BlocksLeftOut, LogRows, Term, Terms, compare, divide};
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
 /// The declared model fitted, and the data divided.
 pub struct PreparedCase<'a> {
-    pub case: &'a Case,
+    pub case: &'a DiagnosisCase,
     pub refit: &'a ModelRefit<'a>,
-    pub data: Data<'a>,
-    pub unknowns: Unknowns,
-    pub fitted: Fitted,
-    pub cover: Cover,
+    pub data: WeightedRows<'a>,
+    pub unknowns: DiagnosisUnknowns,
+    pub fitted: WeightedModel,
+    pub cover: LogCoverage,
     /// Blocks that are fitted.
     pub blocks: Blocks,
     /// Neighbouring pieces of the split that a bootstrap draws together.
@@ -36,11 +36,11 @@ pub struct PreparedCase<'a> {
 }
 
 /// Sums of products about a model.
-pub struct Summed {
+pub struct SummedProducts {
     /// The declared model that they are about.
     pub about: AugmentedModel,
     /// Friction laws by whose direction friction goes.
-    pub directions: Vec<Added>,
+    pub directions: Vec<ModelEffect>,
     pub layout: ColumnLayout,
     pub sums: BlockSums,
     pub declared: Terms,
@@ -48,12 +48,12 @@ pub struct Summed {
 
 impl<'a> PreparedCase<'a> {
     pub fn of(
-        case: &'a Case,
+        case: &'a DiagnosisCase,
         split: &'a DataSplit,
         refit: &'a ModelRefit<'a>,
     ) -> Result<Self, DiagnoseError> {
         let numbers = &case.numbers;
-        let data = Data {
+        let data = WeightedRows {
             stretches: &case.stretches,
             filters: &case.filters,
             split,
@@ -63,7 +63,7 @@ impl<'a> PreparedCase<'a> {
         let whole = divide(&logs, f64::INFINITY, (1, 1)).list;
         let fitted = fit(case, &case.given, (&data, &whole), None)?;
         let train = case.stretches_of(LogRole::Train);
-        let mut cover = Cover::of(&case.given.model.robot, &train, case.cutoff_hz);
+        let mut cover = LogCoverage::of(&case.given.model.robot, &train, case.cutoff_hz);
         let raw = residuals(&fitted.model, &train);
         orders::find(&mut cover, &raw, &train, &case.filters)?;
         drop(raw);
@@ -124,7 +124,7 @@ impl<'a> PreparedCase<'a> {
             return Ok(f64::INFINITY);
         };
         let mut with = moved(model, &self.unknowns, &values);
-        with.effects.push(Added {
+        with.effects.push(ModelEffect {
             linear: values.as_slice()[self.unknowns.len()..].to_vec(),
             ..candidate.effect.clone()
         });
@@ -179,7 +179,7 @@ impl<'a> PreparedCase<'a> {
         &self,
         model: &AugmentedModel,
         role: LogRole,
-    ) -> Result<Option<Errors>, MotionError> {
+    ) -> Result<Option<UseErrors>, MotionError> {
         let friction = &self.case.given.model.friction;
         let rows = HeldOutRows {
             moving: friction.iter().any(JointFriction::jumps),
@@ -196,7 +196,10 @@ pub fn residuals(model: &AugmentedModel, stretches: &[Stretch]) -> Vec<Vec<Vec<f
 }
 
 /// Filtered residuals along all stretches, `[stretch][joint][row]`.
-pub fn filtered(model: &AugmentedModel, data: &Data) -> Result<Vec<Vec<Vec<f64>>>, MotionError> {
+pub fn filtered(
+    model: &AugmentedModel,
+    data: &WeightedRows,
+) -> Result<Vec<Vec<Vec<f64>>>, MotionError> {
     let of = |stretch: &Stretch| {
         let raw = model.residual(stretch, &model.torques(stretch));
         let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
@@ -208,7 +211,7 @@ pub fn filtered(model: &AugmentedModel, data: &Data) -> Result<Vec<Vec<Vec<f64>>
 /// A model about the fitted one, its unknowns moved.
 pub fn moved(
     fitted: &AugmentedModel,
-    unknowns: &Unknowns,
+    unknowns: &DiagnosisUnknowns,
     values: &DVector<f64>,
 ) -> AugmentedModel {
     let mut model = fitted.clone();

@@ -5,18 +5,19 @@ use rayon::prelude::*;
 
 use super::change::friction_changes;
 use super::error::DiagnoseError;
+use super::outcome::JudgedEffects;
 use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, NotWritten, WhatIsLeft};
 use super::prepared::{PreparedCase, filtered, residuals};
-use super::problem::case::Case;
+use super::problem::case::DiagnosisCase;
 use super::problem::data_split::{DataSplit, LogRole};
 use super::refit::ModelRefit;
 use super::searched::SearchedCase;
-use super::steps::{Judged, judge};
-use super::unexplained::dependence::{Left, dependences};
+use super::steps::judge;
+use super::unexplained::dependence::{ModelResiduals, dependences};
 use super::unexplained::noise_floor::floor;
 use super::unexplained::{part_unexplained, unexplained};
-use super::watch::Watch;
-use crate::effect::{AugmentedModel, Search};
+use super::watch::DiagnosisWatch;
+use crate::effect::{AugmentedModel, ShapeSearch};
 use crate::judge::Numbers;
 use crate::motion::Stretch;
 
@@ -25,7 +26,11 @@ use crate::motion::Stretch;
 ///
 /// # Errors
 /// [`DiagnoseError`].
-pub fn diagnose(case: &Case, refit: &ModelRefit, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
+pub fn diagnose(
+    case: &DiagnosisCase,
+    refit: &ModelRefit,
+    watch: DiagnosisWatch,
+) -> Result<Diagnosis, DiagnoseError> {
     let split = case.split();
     check(case, &split)?;
     let prepared = PreparedCase::of(case, &split, refit)?;
@@ -46,7 +51,7 @@ pub fn diagnose(case: &Case, refit: &ModelRefit, watch: Watch) -> Result<Diagnos
 }
 
 /// Refuses what cannot be fitted.
-fn check(case: &Case, split: &DataSplit) -> Result<(), DiagnoseError> {
+fn check(case: &DiagnosisCase, split: &DataSplit) -> Result<(), DiagnoseError> {
     let unknowns = case.unknowns().len();
     let rows = split.rows_of(LogRole::Train);
     if rows < 10 * unknowns {
@@ -66,7 +71,7 @@ impl PreparedCase<'_> {
     fn evaluate(
         &self,
         searched: &SearchedCase,
-        judged: Judged,
+        judged: JudgedEffects,
     ) -> Result<Diagnosis, DiagnoseError> {
         let case = self.case;
         let before = self.split_errors(&case.in_use)?;
@@ -134,7 +139,7 @@ impl PreparedCase<'_> {
         let structured = (0..unexplained.len()).filter(|j| unexplained[*j].is_structure());
         let structured: Vec<usize> = structured.collect();
         let torques = case.stretches.par_iter().map(|s| model.torques(s));
-        let left = Left {
+        let left = ModelResiduals {
             data: &self.data,
             residual: &filtered(model, &self.data)?,
             torques: &torques.collect::<Vec<_>>(),
@@ -190,7 +195,7 @@ fn left_candidates(
     for l in &searched.looked {
         let own = effect(l.candidate);
         let score = l.gain.value / searched.error.max(f64::MIN_POSITIVE);
-        let waves = own.law.entry.search == Search::Orders;
+        let waves = own.law.entry.search == ShapeSearch::Orders;
         let same = |name: &str, place| name == own.name() && place == own.place;
         let mut chosen = searched.chosen.iter().map(|c| effect(c.candidate));
         if !waves && chosen.any(|c| same(c.name(), c.place)) {

@@ -3,24 +3,24 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, exclude, is_friction_law};
+use super::candidates::{EffectCandidate, exclude, is_friction_law};
 use super::error::DiagnoseError;
-use super::prepared::{PreparedCase, Summed};
-use super::watch::Watch;
-use crate::effect::{Added, Place};
+use super::prepared::{PreparedCase, SummedProducts};
+use super::watch::DiagnosisWatch;
+use crate::effect::{EffectPlace, ModelEffect};
 use crate::judge::{BlocksLeftOut, ErrorGain, Numbers, Term, Terms};
 
 /// Candidates by their sums of products.
 #[derive(Clone, Copy)]
 pub struct Field<'a> {
     pub prepared: &'a PreparedCase<'a>,
-    pub candidates: &'a [Candidate],
-    pub summed: &'a Summed,
+    pub candidates: &'a [EffectCandidate],
+    pub summed: &'a SummedProducts,
 }
 
 /// A candidate that gained most in its turn.
 #[derive(Debug, Clone)]
-pub struct Chosen {
+pub struct ChosenCandidate {
     pub candidate: usize,
     /// Gain beside those before it.
     pub gain: ErrorGain,
@@ -32,7 +32,7 @@ pub struct Chosen {
 
 /// The last look at a candidate that was not chosen.
 #[derive(Debug, Clone)]
-pub struct Looked {
+pub struct RejectedCandidate {
     pub candidate: usize,
     pub gain: ErrorGain,
 }
@@ -45,7 +45,7 @@ impl<'a> Field<'a> {
         &self.prepared.case.numbers
     }
 
-    pub fn effect(&self, chosen: &Chosen) -> &'a Added {
+    pub fn effect(&self, chosen: &ChosenCandidate) -> &'a ModelEffect {
         &self.candidates[chosen.candidate].effect
     }
 
@@ -57,13 +57,13 @@ impl<'a> Field<'a> {
     /// Chooses beside what is `chosen` what gains, the greatest first, and says what the others would gain in the end.
     pub fn search(
         &self,
-        mut chosen: Vec<Chosen>,
-        watch: Watch,
-    ) -> Result<(Vec<Chosen>, Vec<Looked>), DiagnoseError> {
+        mut chosen: Vec<ChosenCandidate>,
+        watch: DiagnosisWatch,
+    ) -> Result<(Vec<ChosenCandidate>, Vec<RejectedCandidate>), DiagnoseError> {
         loop {
             let terms = self.terms(&chosen);
             let left_out = self.left_out(&terms)?;
-            let taken: Vec<&Added> = chosen.iter().map(|c| self.effect(c)).collect();
+            let taken: Vec<&ModelEffect> = chosen.iter().map(|c| self.effect(c)).collect();
             let excluded = |i: usize| {
                 let effect = &self.candidates[i].effect;
                 taken.iter().any(|t| exclude(t, effect))
@@ -74,13 +74,13 @@ impl<'a> Field<'a> {
             let look = |candidate| {
                 part.step();
                 let gain = left_out.gain(self.terms_of(candidate));
-                Looked { candidate, gain }
+                RejectedCandidate { candidate, gain }
             };
-            let looked: Vec<Looked> = open.into_par_iter().map(look).collect();
+            let looked: Vec<RejectedCandidate> = open.into_par_iter().map(look).collect();
             drop(part);
             // at most a friction law for each joint, and so many effects besides
             let laws = taken.iter().filter(|e| is_friction_law(e)).count();
-            let room = |effect: &Added| match is_friction_law(effect) {
+            let room = |effect: &ModelEffect| match is_friction_law(effect) {
                 true => laws < terms.weights.len(),
                 false => taken.len() - laws < self.numbers().effects,
             };
@@ -97,7 +97,7 @@ impl<'a> Field<'a> {
     }
 
     /// Declared terms and those of candidates that were chosen, one behind the other.
-    pub fn terms(&self, chosen: &[Chosen]) -> Terms {
+    pub fn terms(&self, chosen: &[ChosenCandidate]) -> Terms {
         let own = chosen.iter().flat_map(|c| self.terms_of(c.candidate));
         let own: Vec<Term> = own.cloned().collect();
         self.summed.declared.with(&own)
@@ -119,20 +119,25 @@ impl<'a> Field<'a> {
     }
 
     /// The greatest admissible gain, or what says the same with fewer numbers.
-    fn best(&self, looked: &[Looked], room: &dyn Fn(&Added) -> bool) -> Option<Chosen> {
-        let effect = |l: &Looked| &self.candidates[l.candidate].effect;
+    fn best(
+        &self,
+        looked: &[RejectedCandidate],
+        room: &dyn Fn(&ModelEffect) -> bool,
+    ) -> Option<ChosenCandidate> {
+        let effect = |l: &RejectedCandidate| &self.candidates[l.candidate].effect;
         let Numbers { screen, same, .. } = *self.numbers();
-        let beyond = |l: &&Looked| l.gain.is_beyond(screen, own_joint(effect(l).place));
+        let beyond = |l: &&RejectedCandidate| l.gain.is_beyond(screen, own_joint(effect(l).place));
         let admissible = looked.iter().filter(|l| room(effect(l)));
-        let admissible: Vec<&Looked> = admissible.filter(beyond).collect();
-        let value = |a: &&Looked, b: &&Looked| a.gain.value.total_cmp(&b.gain.value);
+        let admissible: Vec<&RejectedCandidate> = admissible.filter(beyond).collect();
+        let value =
+            |a: &&RejectedCandidate, b: &&RejectedCandidate| a.gain.value.total_cmp(&b.gain.value);
         let best = admissible.iter().copied().max_by(value)?;
-        let near = |l: &&Looked| {
+        let near = |l: &&RejectedCandidate| {
             let [own, place] = [effect(l).place, effect(best).place];
             let mut joints = 0..self.prepared.cover.joints.len();
             joints.any(|j| own.touches(j) && place.touches(j)) && l.gain.is_near(&best.gain, same)
         };
-        let mut alike: Vec<&Looked> = admissible.iter().copied().filter(near).collect();
+        let mut alike: Vec<&RejectedCandidate> = admissible.iter().copied().filter(near).collect();
         alike.push(best);
         alike.sort_by(|a, b| value(b, a));
         // the first of those with the fewest
@@ -145,7 +150,7 @@ impl<'a> Field<'a> {
                 alternatives.push(other.candidate);
             }
         }
-        Some(Chosen {
+        Some(ChosenCandidate {
             candidate: taken.candidate,
             gain: taken.gain.clone(),
             error: 0.0,
@@ -155,9 +160,12 @@ impl<'a> Field<'a> {
 }
 
 /// The joint that an effect must explain by itself; none of one on several.
-pub fn own_joint(place: Place) -> Option<usize> {
+pub fn own_joint(place: EffectPlace) -> Option<usize> {
     match place {
-        Place::Joint(j) | Place::Pair { on: j, .. } => Some(j),
-        Place::Actuator(_) | Place::Actuators | Place::Geared { .. } | Place::All => None,
+        EffectPlace::Joint(j) | EffectPlace::Pair { on: j, .. } => Some(j),
+        EffectPlace::Actuator(_)
+        | EffectPlace::Actuators
+        | EffectPlace::Geared { .. }
+        | EffectPlace::All => None,
     }
 }

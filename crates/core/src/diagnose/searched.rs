@@ -4,15 +4,15 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, NotTried, candidates, exclude, is_friction_law};
+use super::candidates::{EffectCandidate, NotTried, candidates, exclude, is_friction_law};
 use super::error::DiagnoseError;
-use super::prepared::{PreparedCase, Summed};
+use super::prepared::{PreparedCase, SummedProducts};
 use super::problem::fit::{declared_terms, determines_some};
-use super::problem::pass::{ColumnLayout, Data, pass};
-use super::search::{Chosen, Field, Looked};
-use super::tables::Estimates;
-use super::watch::Watch;
-use crate::effect::{Added, AugmentedModel};
+use super::problem::pass::{ColumnLayout, WeightedRows, pass};
+use super::search::{ChosenCandidate, Field, RejectedCandidate};
+use super::tables::EffectEstimates;
+use super::watch::DiagnosisWatch;
+use crate::effect::{AugmentedModel, ModelEffect};
 use crate::explain::ErrorText;
 use crate::judge::{BlockSums, compare, weighted};
 use crate::motion::{MotionError, Stretch};
@@ -20,17 +20,17 @@ use crate::motion::{MotionError, Stretch};
 /// What the search came to.
 pub struct SearchedCase {
     /// Those that were chosen in their best shape.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<EffectCandidate>,
     pub not_tried: Vec<NotTried>,
-    pub summed: Summed,
-    pub chosen: Vec<Chosen>,
-    pub looked: Vec<Looked>,
+    pub summed: SummedProducts,
+    pub chosen: Vec<ChosenCandidate>,
+    pub looked: Vec<RejectedCandidate>,
     /// Squared error of blocks left out by all that was chosen, in the weights of the joints.
     pub error: f64,
     /// The sums with as much noise again in the positions; none where nothing was chosen.
     pub noisier: Option<BlockSums>,
     /// Friction laws by whose direction friction goes.
-    pub directions: Vec<Added>,
+    pub directions: Vec<ModelEffect>,
     /// Whether the declared model explains more of blocks left out than no torque does.
     pub determined: bool,
 }
@@ -40,13 +40,13 @@ impl PreparedCase<'_> {
     pub fn summed(
         &self,
         about: AugmentedModel,
-        candidates: &[Candidate],
-        directions: &[Added],
-    ) -> Result<Summed, MotionError> {
+        candidates: &[EffectCandidate],
+        directions: &[ModelEffect],
+    ) -> Result<SummedProducts, MotionError> {
         let layout = ColumnLayout::of(&self.unknowns, candidates);
         let mut declared = declared_terms(self.case, &self.unknowns, &layout, &about);
         declared.weights.clone_from(&self.fitted.weights);
-        let mut summed = Summed {
+        let mut summed = SummedProducts {
             about,
             directions: directions.to_vec(),
             layout,
@@ -60,14 +60,14 @@ impl PreparedCase<'_> {
     /// A pass over stretches for the same columns.
     fn passed(
         &self,
-        summed: &Summed,
-        candidates: &[Candidate],
+        summed: &SummedProducts,
+        candidates: &[EffectCandidate],
         stretches: &[Stretch],
     ) -> Result<BlockSums, MotionError> {
         let mut beside = summed.about.clone();
         beside.effects.extend_from_slice(&summed.directions);
         let columns = (&self.unknowns, candidates);
-        let data = Data {
+        let data = WeightedRows {
             stretches,
             ..self.data
         };
@@ -77,8 +77,8 @@ impl PreparedCase<'_> {
     /// The sums with as much noise again in the positions as they have, in the mean over both signs of it.
     pub fn noisier(
         &self,
-        summed: &Summed,
-        candidates: &[Candidate],
+        summed: &SummedProducts,
+        candidates: &[EffectCandidate],
     ) -> Result<BlockSums, MotionError> {
         let mut candidates = candidates.to_vec();
         let summed_too = candidates.iter_mut().zip(&summed.layout.candidates);
@@ -96,7 +96,11 @@ impl PreparedCase<'_> {
         Ok(with(1.0)?.mean(&with(-1.0)?))
     }
 
-    pub fn field<'b>(&'b self, candidates: &'b [Candidate], summed: &'b Summed) -> Field<'b> {
+    pub fn field<'b>(
+        &'b self,
+        candidates: &'b [EffectCandidate],
+        summed: &'b SummedProducts,
+    ) -> Field<'b> {
         Field {
             prepared: self,
             candidates,
@@ -105,7 +109,7 @@ impl PreparedCase<'_> {
     }
 
     /// Chooses what gains, and what the user wants.
-    pub fn search(&self, watch: Watch) -> Result<SearchedCase, DiagnoseError> {
+    pub fn search(&self, watch: DiagnosisWatch) -> Result<SearchedCase, DiagnoseError> {
         let model = &self.fitted.model;
         let (mut candidates, not_tried) = candidates(model, self.case, &self.cover);
         let mut summed = self.summed(model.clone(), &candidates, &[])?;
@@ -122,11 +126,11 @@ impl PreparedCase<'_> {
         let mut directions = Vec::new();
         if self.blocks.list.len() >= self.case.numbers.least_blocks {
             (chosen, looked) = field.search(Vec::new(), watch)?;
-            let smooth = |c: &&Chosen| {
+            let smooth = |c: &&ChosenCandidate| {
                 let effect = field.effect(c);
                 is_friction_law(effect) && effect.law.direction.is_some()
             };
-            let laws: Vec<Chosen> = chosen.iter().filter(smooth).cloned().collect();
+            let laws: Vec<ChosenCandidate> = chosen.iter().filter(smooth).cloned().collect();
             directions = self.agreed(&mut candidates, &summed, &laws)?;
             if !directions.is_empty() {
                 summed = self.summed(model.clone(), &candidates, &directions)?;
@@ -157,16 +161,16 @@ impl PreparedCase<'_> {
     /// Friction laws in their best shape that are sure, with no amplitude.
     fn agreed(
         &self,
-        candidates: &mut [Candidate],
-        summed: &Summed,
-        laws: &[Chosen],
-    ) -> Result<Vec<Added>, DiagnoseError> {
+        candidates: &mut [EffectCandidate],
+        summed: &SummedProducts,
+        laws: &[ChosenCandidate],
+    ) -> Result<Vec<ModelEffect>, DiagnoseError> {
         if laws.is_empty() {
             return Ok(Vec::new());
         }
         let polished = self.polished(candidates, summed, laws, &[])?;
         let field = self.field(candidates, &polished);
-        let estimates = Estimates::of(&field, laws)?;
+        let estimates = EffectEstimates::of(&field, laws)?;
         let numbers = field.numbers();
         let sure = (laws.iter().zip(&estimates.places)).filter(|(_, place)| {
             let found = estimates
@@ -183,7 +187,7 @@ impl PreparedCase<'_> {
         &self,
         field: &Field,
         not_tried: &[NotTried],
-        chosen: &mut Vec<Chosen>,
+        chosen: &mut Vec<ChosenCandidate>,
     ) -> Result<(), DiagnoseError> {
         let wishes = &self.case.wishes;
         for wanted in wishes.accepted.iter().filter(|w| !wishes.is_formula(w)) {
@@ -211,7 +215,7 @@ impl PreparedCase<'_> {
                     ErrorText::new("these data do not show it: its torque is zero all along, or the same as that of other parameters").remedy("log a motion in which it differs from them"),
                 ));
             }
-            chosen.push(Chosen {
+            chosen.push(ChosenCandidate {
                 candidate,
                 gain,
                 error: left_out.error(),

@@ -5,42 +5,25 @@ use nalgebra::{DMatrix, DVector};
 use super::candidates::no_finding;
 use super::error::DiagnoseError;
 use super::held_out::{EffectChange, HeldOutRows};
-use super::outcome::{FoundEffect, NotWritten, StepStatus};
+use super::outcome::{FoundEffect, JudgedEffects, NotWritten, StepStatus};
 use super::prepared::PreparedCase;
 use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, step, value_of};
 use super::refit::ModelProposal;
-use super::search::{Chosen, Field};
+use super::search::{ChosenCandidate, Field};
 use super::searched::SearchedCase;
-use super::tables::{self, Estimates, Verified};
-use crate::effect::{Added, AugmentedModel};
+use super::tables::{self, EffectEstimates, VerifiedEffect};
+use crate::effect::{AugmentedModel, ModelEffect};
 
-/// What is made of the effects that were chosen.
-#[derive(Clone)]
-pub struct Judged {
-    pub steps: Vec<FoundEffect>,
-    /// With the declared numbers by the judge's sums; the given model where nothing is written.
-    pub proposed: AugmentedModel,
-    /// As torques are computed, before held-out data took anything out.
-    pub judge: AugmentedModel,
-    /// As torques are computed; the given model where nothing is left.
-    pub written: AugmentedModel,
-    /// The joint fit with every effect that stands.
-    pub estimates: AugmentedModel,
-    pub covariance: DMatrix<f64>,
-    /// What the effects' amplitudes add to the covariance of the unknowns.
-    pub by_effects: DMatrix<f64>,
-    /// From the unknowns beside the parts of effects that predict to those beside whole ones.
-    pub to_estimate: DVector<f64>,
-}
+type StepResult<T> = Result<T, DiagnoseError>;
 
 /// One effect on its way.
-struct Way {
-    chosen: Chosen,
+struct PendingEffect {
+    chosen: ChosenCandidate,
     accepted: bool,
     /// By the joint fit in which it was asked last.
-    found: Option<Found>,
+    found: Option<FittedEffect>,
     left: Option<NotWritten>,
     came_back: bool,
     /// Amplitude in the predicting model; none where it is not in it.
@@ -51,24 +34,24 @@ struct Way {
 }
 
 /// What a joint fit makes of an effect.
-struct Found {
-    verified: Verified,
+struct FittedEffect {
+    verified: VerifiedEffect,
     /// With its coefficients there.
-    effect: Added,
+    effect: ModelEffect,
     /// Of its (shape, linear), row-major.
     covariance: Vec<f64>,
 }
 
-impl Way {
+impl PendingEffect {
     fn stands(&self) -> bool {
         self.left.is_none()
     }
 }
 
 /// Settles the set, then asks held-out data.
-pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged, DiagnoseError> {
+pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<JudgedEffects> {
     let fitted = prepared.blocks.list.len();
-    let mut work = Judging {
+    let mut work = EffectJudge {
         prepared,
         field: prepared.field(&searched.candidates, &searched.summed),
         noisier: searched.noisier.as_ref().map(|sums| sums.over(0..fitted)),
@@ -91,7 +74,8 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> Result<Judged,
     Ok(work.described(&ways, &estimates, (judge.1, written)))
 }
 
-struct Judging<'a> {
+/// What judges the effects that were chosen: the prepared case and its field.
+struct EffectJudge<'a> {
     prepared: &'a PreparedCase<'a>,
     field: Field<'a>,
     /// Sums of all blocks with as much noise again in the positions.
@@ -100,22 +84,22 @@ struct Judging<'a> {
     other_numbers: bool,
 }
 
-impl Judging<'_> {
+impl EffectJudge<'_> {
     /// The effects that were chosen, and those that the user wants.
-    fn ways(&self, searched: &SearchedCase) -> Vec<Way> {
+    fn ways(&self, searched: &SearchedCase) -> Vec<PendingEffect> {
         let case = self.prepared.case;
-        let named = |effect: &Added| {
+        let named = |effect: &ModelEffect| {
             let mut wanted = case.wishes.accepted.iter();
             wanted.any(|w| case.is_named(effect, w))
         };
-        let formula_wanted = |effect: &Added| {
+        let formula_wanted = |effect: &ModelEffect| {
             let joint = effect.place.name(&case.given.model.robot);
             let own = |name: &String| effect.name().starts_with(name);
             joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
         };
-        let way = |chosen: &Chosen| {
+        let way = |chosen: &ChosenCandidate| {
             let effect = self.field.effect(chosen);
-            Way {
+            PendingEffect {
                 accepted: named(effect) || effect.law.formula.is_some() && formula_wanted(effect),
                 chosen: chosen.clone(),
                 found: None,
@@ -130,7 +114,7 @@ impl Judging<'_> {
     }
 
     /// Lets effects leave until all that stand pass beside one another, the least sure first.
-    fn settle(&self, ways: &mut [Way]) -> Result<Estimates, DiagnoseError> {
+    fn settle(&self, ways: &mut [PendingEffect]) -> StepResult<EffectEstimates> {
         loop {
             let set: Vec<usize> = (0..ways.len()).filter(|i| ways[*i].stands()).collect();
             let estimates = self.ask(ways, &set)?;
@@ -160,7 +144,7 @@ impl Judging<'_> {
     /// Lets those that left come back where they pass beside all that stand, the surest first: of effects that explain
     /// the same, one that left beside another is surer when that has left too. One stays where blocks left out are
     /// better explained by the set that settles with it.
-    fn readmit(&self, ways: &mut [Way]) -> Result<Estimates, DiagnoseError> {
+    fn readmit(&self, ways: &mut [PendingEffect]) -> StepResult<EffectEstimates> {
         loop {
             self.ask_those_that_left(ways)?;
             let certainty = |i: &usize| {
@@ -191,16 +175,16 @@ impl Judging<'_> {
     }
 
     /// Weighted squared error of blocks left out by all that stand.
-    fn error_left_out(&self, ways: &[Way]) -> Result<f64, DiagnoseError> {
+    fn error_left_out(&self, ways: &[PendingEffect]) -> StepResult<f64> {
         let set = ways.iter().filter(|w| w.stands());
-        let set: Vec<Chosen> = set.map(|w| w.chosen.clone()).collect();
+        let set: Vec<ChosenCandidate> = set.map(|w| w.chosen.clone()).collect();
         Ok(self.field.left_out(&self.field.terms(&set))?.error())
     }
 
     /// Asks the blocks for effects in one joint fit.
-    fn ask(&self, ways: &mut [Way], set: &[usize]) -> Result<Estimates, DiagnoseError> {
-        let chosen: Vec<Chosen> = set.iter().map(|i| ways[*i].chosen.clone()).collect();
-        let estimates = Estimates::of(&self.field, &chosen)?;
+    fn ask(&self, ways: &mut [PendingEffect], set: &[usize]) -> StepResult<EffectEstimates> {
+        let chosen: Vec<ChosenCandidate> = set.iter().map(|i| ways[*i].chosen.clone()).collect();
+        let estimates = EffectEstimates::of(&self.field, &chosen)?;
         for (at, i) in set.iter().enumerate() {
             ways[*i].found = Some(self.found(&estimates, &chosen, at)?);
         }
@@ -210,12 +194,12 @@ impl Judging<'_> {
     /// What a joint fit makes of one of its effects.
     fn found(
         &self,
-        estimates: &Estimates,
-        chosen: &[Chosen],
+        estimates: &EffectEstimates,
+        chosen: &[ChosenCandidate],
         at: usize,
-    ) -> Result<Found, DiagnoseError> {
+    ) -> StepResult<FittedEffect> {
         let effect = estimates.effect(&self.field, &chosen[at], at);
-        Ok(Found {
+        Ok(FittedEffect {
             verified: estimates.verified(&self.field, chosen, at, self.noisier.as_deref())?,
             covariance: estimates.covariance_of(&effect, at),
             effect,
@@ -223,21 +207,21 @@ impl Judging<'_> {
     }
 
     /// Each of those that left beside all that stand: what it would be.
-    fn ask_those_that_left(&self, ways: &mut [Way]) -> Result<(), DiagnoseError> {
+    fn ask_those_that_left(&self, ways: &mut [PendingEffect]) -> StepResult<()> {
         let set = ways.iter().filter(|w| w.stands());
-        let set: Vec<Chosen> = set.map(|w| w.chosen.clone()).collect();
+        let set: Vec<ChosenCandidate> = set.map(|w| w.chosen.clone()).collect();
         for way in ways.iter_mut().filter(|w| !w.stands()) {
             let mut asked = set.clone();
             asked.push(way.chosen.clone());
-            let estimates = Estimates::of(&self.field, &asked)?;
+            let estimates = EffectEstimates::of(&self.field, &asked)?;
             way.found = Some(self.found(&estimates, &asked, set.len())?);
         }
         Ok(())
     }
 
     /// Why an effect leaves the set, where it does.
-    fn leaves(&self, way: &Way) -> Option<NotWritten> {
-        let Found {
+    fn leaves(&self, way: &PendingEffect) -> Option<NotWritten> {
+        let FittedEffect {
             verified, effect, ..
         } = way.found.as_ref()?;
         let Self { prepared, .. } = self;
@@ -255,8 +239,8 @@ impl Judging<'_> {
     }
 
     /// Part of an effect's amplitude that predicts. What a person can measure is whole or is not there.
-    fn factor(&self, way: &Way) -> f64 {
-        let Some(Found {
+    fn factor(&self, way: &PendingEffect) -> f64 {
+        let Some(FittedEffect {
             verified, effect, ..
         }) = &way.found
         else {
@@ -275,9 +259,9 @@ impl Judging<'_> {
     /// The model with the effects that stand: by the judge's sums, and as torques would be computed.
     fn written(
         &self,
-        ways: &[Way],
-        estimates: &Estimates,
-    ) -> Result<(AugmentedModel, AugmentedModel), DiagnoseError> {
+        ways: &[PendingEffect],
+        estimates: &EffectEstimates,
+    ) -> StepResult<(AugmentedModel, AugmentedModel)> {
         let case = self.prepared.case;
         let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
         if effects.is_empty() {
@@ -301,7 +285,7 @@ impl Judging<'_> {
     }
 
     /// Whether these data ask for declared numbers other than the given ones with what the effects change.
-    fn wants_other_numbers(&self, ways: &[Way]) -> Result<bool, DiagnoseError> {
+    fn wants_other_numbers(&self, ways: &[PendingEffect]) -> StepResult<bool> {
         let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
         let fitted = self.prepared.refitted(&self.fitted(&effects))?;
         let kept = self.as_given(fitted.clone());
@@ -318,7 +302,7 @@ impl Judging<'_> {
         model
     }
 
-    fn fitted(&self, ways: &[&Way]) -> AugmentedModel {
+    fn fitted(&self, ways: &[&PendingEffect]) -> AugmentedModel {
         let own = ways.iter();
         let own = own.filter_map(|w| Some((&w.chosen, w.amplitude.clone()?)));
         tables::model(&self.field, &own.collect::<Vec<_>>())
@@ -334,7 +318,7 @@ impl Judging<'_> {
 
     /// The effect to take out, where the model that would be written is worse than the given one on held-out data, at a
     /// joint or in the mean: the one whose absence helps most where it is worse.
-    fn harm(&self, ways: &[Way], written: &AugmentedModel) -> Result<Option<usize>, DiagnoseError> {
+    fn harm(&self, ways: &[PendingEffect], written: &AugmentedModel) -> StepResult<Option<usize>> {
         let (rows, given) = self.judging_rows();
         let set: Vec<usize> = (0..ways.len())
             .filter(|i| ways[*i].amplitude.is_some())
@@ -352,12 +336,12 @@ impl Judging<'_> {
         if !worse.contains(&true) && change.mean[1] <= change.mean[0] {
             return Ok(None);
         }
-        let all: Vec<&Way> = set.iter().map(|i| &ways[*i]).collect();
+        let all: Vec<&PendingEffect> = set.iter().map(|i| &ways[*i]).collect();
         let with = self.based(self.fitted(&all));
         let mut most: Option<(usize, f64)> = None;
         for i in free {
             let others = set.iter().filter(|k| **k != i);
-            let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
+            let others: Vec<&PendingEffect> = others.map(|k| &ways[*k]).collect();
             let without = self.based(self.fitted(&others));
             let Some(own) = rows.change([&without, &with])? else {
                 continue;
@@ -375,18 +359,18 @@ impl Judging<'_> {
     }
 
     /// What each effect that stands changes on held-out data, the others refitted by the judge's sums.
-    fn held_out(&self, ways: &mut [Way], written: &AugmentedModel) -> Result<(), DiagnoseError> {
+    fn held_out(&self, ways: &mut [PendingEffect], written: &AugmentedModel) -> StepResult<()> {
         let rows = self.prepared.held_out(LogRole::Holdout);
         let set: Vec<usize> = (0..ways.len())
             .filter(|i| ways[*i].amplitude.is_some())
             .collect();
-        let all: Vec<&Way> = set.iter().map(|i| &ways[*i]).collect();
+        let all: Vec<&PendingEffect> = set.iter().map(|i| &ways[*i]).collect();
         let with = self.based(self.fitted(&all));
         let unknowns = &self.prepared.unknowns;
         let before = self.prepared.case.given.effects.len();
         for (at, i) in set.iter().enumerate() {
             let others = set.iter().filter(|k| *k != i);
-            let others: Vec<&Way> = others.map(|k| &ways[*k]).collect();
+            let others: Vec<&PendingEffect> = others.map(|k| &ways[*k]).collect();
             let without = self.based(self.fitted(&others));
             ways[*i].change = rows.change([&without, &with])?;
             // the written model moved by as much as the judge's sums move without the effect
@@ -402,10 +386,10 @@ impl Judging<'_> {
 
     fn described(
         &self,
-        ways: &[Way],
-        estimates: &Estimates,
+        ways: &[PendingEffect],
+        estimates: &EffectEstimates,
         (judge, (proposed, written)): (AugmentedModel, (AugmentedModel, AugmentedModel)),
-    ) -> Judged {
+    ) -> JudgedEffects {
         let mut place = self.prepared.case.given.effects.len();
         let mut steps = Vec::new();
         for way in ways {
@@ -418,7 +402,7 @@ impl Judging<'_> {
             steps.push(found);
         }
         let (by_effects, to_estimate) = self.by_effects(ways, estimates);
-        Judged {
+        JudgedEffects {
             estimates: estimates.model(&self.field),
             covariance: estimates.covariance.clone(),
             by_effects,
@@ -431,7 +415,11 @@ impl Judging<'_> {
     }
 
     /// What the amplitudes of the effects that stand do to the unknowns beside them.
-    fn by_effects(&self, ways: &[Way], estimates: &Estimates) -> (DMatrix<f64>, DVector<f64>) {
+    fn by_effects(
+        &self,
+        ways: &[PendingEffect],
+        estimates: &EffectEstimates,
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let declared = self.field.summed.declared.len();
         let (mut spread, mut shift) =
             (DMatrix::zeros(declared, declared), DVector::zeros(declared));
@@ -451,9 +439,9 @@ impl Judging<'_> {
         (spread, shift)
     }
 
-    fn step(&self, way: &Way) -> Option<FoundEffect> {
+    fn step(&self, way: &PendingEffect) -> Option<FoundEffect> {
         let numbers = self.field.numbers();
-        let Found {
+        let FittedEffect {
             verified,
             effect,
             covariance,

@@ -4,22 +4,22 @@ use nalgebra::{DMatrix, DVector};
 
 use super::error::DiagnoseError;
 use super::prepared::moved;
-use super::search::{Chosen, Field, own_joint};
-use crate::effect::{Added, AugmentedModel};
+use super::search::{ChosenCandidate, Field, own_joint};
+use crate::effect::{AugmentedModel, ModelEffect};
 use crate::judge::{EffectAmplitude, EffectTerms, ErrorGain, JointFit, Terms};
 
 /// What the blocks say of an effect.
 #[derive(Debug, Clone)]
-pub struct Verified {
+pub struct VerifiedEffect {
     pub amplitude: EffectAmplitude,
     /// Its coefficients by block, all else as the joint fit has it.
     pub blocks: Vec<Vec<f64>>,
-    pub beside: Beside,
+    pub beside: MarginalGain,
 }
 
 /// What an effect is worth beside others, which are refitted.
 #[derive(Debug, Clone)]
-pub struct Beside {
+pub struct MarginalGain {
     /// Gain on blocks left out, and their squared error without it.
     pub gain: ErrorGain,
     pub error: f64,
@@ -28,7 +28,7 @@ pub struct Beside {
 }
 
 /// The joint fit of declared terms and effects, shapes free.
-pub struct Estimates {
+pub struct EffectEstimates {
     pub fit: JointFit,
     /// Of its values.
     pub covariance: DMatrix<f64>,
@@ -45,9 +45,9 @@ pub struct TermPlaces {
     pub shapes: Vec<usize>,
 }
 
-impl Estimates {
+impl EffectEstimates {
     /// The joint fit with some effects.
-    pub fn of(field: &Field, effects: &[Chosen]) -> Result<Self, DiagnoseError> {
+    pub fn of(field: &Field, effects: &[ChosenCandidate]) -> Result<Self, DiagnoseError> {
         let rows = field.prepared.case.prior.rows_per_independent;
         let (terms, places) = with_shapes(field, effects);
         let fitted = field.prepared.blocks.list.len();
@@ -56,7 +56,7 @@ impl Estimates {
         if let Some(kept) = &field.prepared.case.kept {
             fit.widen_by_held(&field.summed.layout.held, kept);
         }
-        Ok(Estimates {
+        Ok(EffectEstimates {
             covariance: fit.covariance(),
             fit,
             places,
@@ -68,15 +68,15 @@ impl Estimates {
     pub fn verified(
         &self,
         field: &Field,
-        effects: &[Chosen],
+        effects: &[ChosenCandidate],
         at: usize,
         noisier: Option<&[DMatrix<f64>]>,
-    ) -> Result<Verified, DiagnoseError> {
+    ) -> Result<VerifiedEffect, DiagnoseError> {
         let numbers = field.numbers();
         let terms = &self.places[at].terms;
         let measured = field.effect(&effects[at]).law.entry.measurable;
         let beside = beside_the_others(field, effects, at)?;
-        Ok(Verified {
+        Ok(VerifiedEffect {
             amplitude: self.fit.amplitude(terms, (noisier, measured), numbers),
             blocks: self.fit.by_block(terms, numbers),
             beside,
@@ -84,14 +84,14 @@ impl Estimates {
     }
 
     /// An effect of the fit with its coefficients.
-    pub fn effect(&self, field: &Field, chosen: &Chosen, at: usize) -> Added {
+    pub fn effect(&self, field: &Field, chosen: &ChosenCandidate, at: usize) -> ModelEffect {
         let own = self.places[at].terms.coefficients.clone();
         let linear: Vec<f64> = own.map(|i| self.fit.values[i]).collect();
         effect(field, chosen, &linear)
     }
 
     /// Covariance of (shape, linear) of an effect, row-major; a shape that is not free has none.
-    pub fn covariance_of(&self, effect: &Added, at: usize) -> Vec<f64> {
+    pub fn covariance_of(&self, effect: &ModelEffect, at: usize) -> Vec<f64> {
         let all = &self.covariance;
         let (count, size) = (effect.shape.len(), effect.parameters());
         let TermPlaces { terms, shapes } = &self.places[at];
@@ -129,9 +129,9 @@ impl Estimates {
 /// What an effect is worth beside all the others.
 pub fn beside_the_others(
     field: &Field,
-    chosen: &[Chosen],
+    chosen: &[ChosenCandidate],
     at: usize,
-) -> Result<Beside, DiagnoseError> {
+) -> Result<MarginalGain, DiagnoseError> {
     let mut others = chosen.to_vec();
     let own = others.remove(at);
     let terms = field.terms(&others);
@@ -158,7 +158,7 @@ pub fn beside_the_others(
         Some(j) => noticed(j),
         None => joints.any(noticed),
     };
-    Ok(Beside {
+    Ok(MarginalGain {
         error: left_out.error(),
         gain,
         noticeable,
@@ -166,7 +166,7 @@ pub fn beside_the_others(
 }
 
 /// Terms of declared unknowns and effects, each with the slopes by its shape, and where these stand.
-fn with_shapes(field: &Field, effects: &[Chosen]) -> (Terms, Vec<TermPlaces>) {
+fn with_shapes(field: &Field, effects: &[ChosenCandidate]) -> (Terms, Vec<TermPlaces>) {
     let mut terms = field.summed.declared.clone();
     let mut places = Vec::new();
     for c in effects {
@@ -195,8 +195,8 @@ fn with_shapes(field: &Field, effects: &[Chosen]) -> (Terms, Vec<TermPlaces>) {
 }
 
 /// The declared model with effects of given amplitudes, its unknowns those of the fit beside them.
-pub fn model(field: &Field, effects: &[(&Chosen, Vec<f64>)]) -> AugmentedModel {
-    let chosen: Vec<Chosen> = effects.iter().map(|(c, _)| (*c).clone()).collect();
+pub fn model(field: &Field, effects: &[(&ChosenCandidate, Vec<f64>)]) -> AugmentedModel {
+    let chosen: Vec<ChosenCandidate> = effects.iter().map(|(c, _)| (*c).clone()).collect();
     let first = field.summed.declared.len();
     let amplitudes = effects.iter().flat_map(|(_, a)| a.iter().copied());
     let held: Vec<(usize, f64)> = (first..).zip(amplitudes).collect();
@@ -208,8 +208,8 @@ pub fn model(field: &Field, effects: &[(&Chosen, Vec<f64>)]) -> AugmentedModel {
 }
 
 /// An effect with its amplitudes.
-pub fn effect(field: &Field, chosen: &Chosen, linear: &[f64]) -> Added {
-    Added {
+pub fn effect(field: &Field, chosen: &ChosenCandidate, linear: &[f64]) -> ModelEffect {
+    ModelEffect {
         linear: linear.to_vec(),
         ..field.effect(chosen).clone()
     }

@@ -4,7 +4,7 @@ use super::error::DiagnoseError;
 
 /// What a diagnosis says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Heard<'a> {
+pub enum DiagnosisProgress<'a> {
     /// A part of the search begins: its name, and how many steps it takes. How many parts will follow is not known
     /// before the search ends.
     Begin(&'a str, u64),
@@ -16,12 +16,12 @@ pub enum Heard<'a> {
 
 /// Who is informed, from any thread, and who says whether to end.
 #[derive(Clone, Copy)]
-pub struct Watch<'a> {
-    pub tell: &'a (dyn Fn(Heard) + Sync),
+pub struct DiagnosisWatch<'a> {
+    pub tell: &'a (dyn Fn(DiagnosisProgress) + Sync),
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl<'a> Watch<'a> {
+impl<'a> DiagnosisWatch<'a> {
     /// An error where the search is to end.
     pub(crate) fn unless_stopped(self) -> Result<(), DiagnoseError> {
         match (self.stop)() {
@@ -31,25 +31,25 @@ impl<'a> Watch<'a> {
     }
 
     /// Begins a part of `steps` steps, which ends when the guard is dropped.
-    pub(crate) fn part(self, name: &str, steps: usize) -> Part<'a> {
-        (self.tell)(Heard::Begin(name, steps as u64));
-        Part(self)
+    pub(crate) fn part(self, name: &str, steps: usize) -> SearchPart<'a> {
+        (self.tell)(DiagnosisProgress::Begin(name, steps as u64));
+        SearchPart(self)
     }
 }
 
 /// A part of the search that is under way.
-pub(crate) struct Part<'a>(Watch<'a>);
+pub(crate) struct SearchPart<'a>(DiagnosisWatch<'a>);
 
-impl Part<'_> {
+impl SearchPart<'_> {
     /// One more of its steps is done.
     pub(crate) fn step(&self) {
-        (self.0.tell)(Heard::Step);
+        (self.0.tell)(DiagnosisProgress::Step);
     }
 }
 
-impl Drop for Part<'_> {
+impl Drop for SearchPart<'_> {
     fn drop(&mut self) {
-        (self.0.tell)(Heard::End);
+        (self.0.tell)(DiagnosisProgress::End);
     }
 }
 
@@ -61,8 +61,8 @@ mod tests {
     #[test]
     fn a_part_is_distinguished_from_its_begin_to_its_end() {
         let heard = Mutex::new(Vec::new());
-        let tell = |h: Heard| heard.lock().unwrap().push(format!("{h:?}"));
-        let watch = Watch {
+        let tell = |h: DiagnosisProgress| heard.lock().unwrap().push(format!("{h:?}"));
+        let watch = DiagnosisWatch {
             tell: &tell,
             stop: &|| false,
         };

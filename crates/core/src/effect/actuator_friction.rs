@@ -2,7 +2,7 @@
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
 use crate::math::hyperbolic::tanh;
-use super::{Entry, Family, Key, Ladder, Law, Places, Search, ShapeSpan, Unit};
+use super::{Entry, Family, Key, Law, PlaceRule, ShapeSearch, ShapeSpan, SpeedLadder, Unit};
 use crate::robot::cft::pantograph::reference_jacobian;
 
 pub static ENTRY: Entry = Entry {
@@ -13,9 +13,9 @@ pub static ENTRY: Entry = Entry {
         Key::size("coulomb", Unit::Fixed("N")),
         Key::shape("slope", Unit::Fixed("s/m")),
     ],
-    places: Places::Actuators,
-    search: Search::Refined,
-    ladder: Some(Ladder::USUAL),
+    places: PlaceRule::Actuators,
+    search: ShapeSearch::Refined,
+    ladder: Some(SpeedLadder::USUAL),
     friction: true,
     separate_by: "move one actuator alone, both ways at several speeds, at three poses of the other",
     formula: "J_a' (viscous v_a + coulomb tanh(slope v_a)), v_a = J_a v",

@@ -1,6 +1,9 @@
 //! An effect with its numbers, as it stands in a model.
 
-use super::{Facts, Family, Instant, KeyValue, Law, Place, Role, Rule, Scene, Seen, Unit};
+use super::{
+    EffectFacts, EffectPlace, EffectScene, Family, Instant, KeyValue, Law, LimitContext, Role,
+    Rule, Unit,
+};
 use crate::robot::Robot;
 
 /// One number of an effect as results and files have it: key, value, standard deviation, unit.
@@ -14,18 +17,18 @@ pub struct EffectNumber {
     pub bound: bool,
 }
 
-/// An effect in a model.
+/// An effect in a model: its law, its place and the numbers of both.
 #[derive(Debug, Clone)]
-pub struct Added {
+pub struct ModelEffect {
     pub law: &'static Law,
-    pub place: Place,
+    pub place: EffectPlace,
     pub shape: Vec<f64>,
     pub linear: Vec<f64>,
     /// Which of (shape, linear) a fit leaves where they are: what the data do not determine, at a bound.
     pub held: Vec<bool>,
 }
 
-impl PartialEq for Added {
+impl PartialEq for ModelEffect {
     fn eq(&self, other: &Self) -> bool {
         self.name() == other.name()
             && self.place == other.place
@@ -34,10 +37,10 @@ impl PartialEq for Added {
     }
 }
 
-impl Added {
+impl ModelEffect {
     /// An effect with its numbers, all of them open to a fit.
-    pub fn new(law: &'static Law, place: Place, shape: Vec<f64>, linear: Vec<f64>) -> Self {
-        Added {
+    pub fn new(law: &'static Law, place: EffectPlace, shape: Vec<f64>, linear: Vec<f64>) -> Self {
+        ModelEffect {
             held: vec![false; shape.len() + linear.len()],
             law,
             place,
@@ -79,7 +82,7 @@ impl Added {
     /// The first rule of its entry, but for those to `skip`, that its numbers break, with the reason in words.
     pub fn broken(
         &self,
-        seen: &Seen,
+        seen: &LimitContext,
         skip: &dyn Fn(&Rule) -> bool,
     ) -> Option<(&'static Rule, String)> {
         let keys = self.law.keys(&self.shape, &self.linear);
@@ -109,7 +112,7 @@ impl Added {
 
     /// What the effect adds to joint `joint` along a scene, into `out` (zeroed before); nothing for
     /// effects that shift the torque.
-    pub fn torque(&self, scene: &Scene, joint: usize, out: &mut [f64]) {
+    pub fn torque(&self, scene: &EffectScene, joint: usize, out: &mut [f64]) {
         out.fill(0.0);
         if self.law.entry.role == Role::Shift || !self.place.touches(joint) {
             return;
@@ -123,7 +126,7 @@ impl Added {
     }
 
     /// Its columns in the rows of joint `joint`.
-    pub fn columns(&self, scene: &Scene, joint: usize) -> Vec<Vec<f64>> {
+    pub fn columns(&self, scene: &EffectScene, joint: usize) -> Vec<Vec<f64>> {
         let mut out = vec![vec![0.0; scene.len()]; self.law.linear.len()];
         if self.place.touches(joint) {
             let mut kept = vec![f64::NAN; self.law.remembered()];
@@ -142,7 +145,7 @@ impl Added {
     /// The same at sample k, by what the law keeps; zero before.
     pub(super) fn at(
         &self,
-        scene: &Scene,
+        scene: &EffectScene,
         (joint, k): (usize, usize),
         kept: &mut [f64],
         out: &mut [f64],
@@ -182,13 +185,13 @@ impl Added {
     pub fn title(&self, robot: &Robot) -> String {
         let name = self.name();
         match (self.place, self.place.name(robot)) {
-            (Place::Pair { of, .. }, Some(on)) => {
+            (EffectPlace::Pair { of, .. }, Some(on)) => {
                 format!("{name} of {on} with {}", robot.joint_names()[of])
             }
-            (Place::Geared { other, .. }, Some(motor)) => {
+            (EffectPlace::Geared { other, .. }, Some(motor)) => {
                 format!("{name} of {motor} and {}", robot.joint_names()[other])
             }
-            (Place::Actuators, _) => format!("{name} of {}", self.place.words(robot)),
+            (EffectPlace::Actuators, _) => format!("{name} of {}", self.place.words(robot)),
             (_, Some(place)) => format!("{name} of {place}"),
             (_, None) => name.to_owned(),
         }
@@ -197,7 +200,7 @@ impl Added {
     /// What it is called where it was found: `ripple of q1, 2.5 mm pitch, 1.2 N`. `torque` is the torque's unit.
     pub fn said(&self, robot: &Robot, torque: &str) -> String {
         let numbers = self.numbers(robot, torque, None).into_iter();
-        let words = (self.law.entry.said)(&Facts {
+        let words = (self.law.entry.said)(&EffectFacts {
             at: self.place.words(robot),
             with: (self.place.from()).map_or(String::new(), |j| robot.joint_names()[j].clone()),
             kind: self.place.kind(robot),

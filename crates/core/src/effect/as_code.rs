@@ -7,8 +7,8 @@
 
 use super::exact;
 use super::site::{CodeSite, saturating};
-pub use super::site::{EffectsCode, Property, Remembered};
-use super::{Added, AugmentedModel, EffectError, Place, entry};
+pub use super::site::{EffectsCode, RobotProperty, StateVariable};
+use super::{AugmentedModel, EffectError, EffectPlace, ModelEffect, entry};
 use crate::robot::FormulaSignal;
 use crate::robot::model::JointFriction;
 
@@ -58,7 +58,7 @@ impl EffectsCode {
 }
 
 /// The formula of a user's own; false where it has none, or calls what code has not.
-fn formula(site: &mut CodeSite, effect: &Added) -> bool {
+fn formula(site: &mut CodeSite, effect: &ModelEffect) -> bool {
     let Some(formulas) = effect.law.formula else {
         return false;
     };
@@ -88,7 +88,7 @@ fn formula(site: &mut CodeSite, effect: &Added) -> bool {
 
 /// Direction of a joint's friction: that of its law, or of what was added to make it smooth.
 fn direction(refined: &AugmentedModel, j: usize) -> String {
-    let smooth = |e: &&Added| e.law.direction.is_some() && e.place == Place::Joint(j);
+    let smooth = |e: &&ModelEffect| e.law.direction.is_some() && e.place == EffectPlace::Joint(j);
     match refined.effects.iter().find(smooth) {
         Some(e) if refined.model.friction[j].jumps() => {
             format!("tanh(v[{j}] / {})", exact(e.shape[0]))
@@ -98,9 +98,9 @@ fn direction(refined: &AugmentedModel, j: usize) -> String {
     }
 }
 
-impl Added {
+impl ModelEffect {
     /// The property that the effect is, where it is one that files of links can have.
-    pub fn property(&self) -> Option<Property> {
+    pub fn property(&self) -> Option<RobotProperty> {
         (self.law.property)(self.place, &self.shape, &self.linear)
     }
 }

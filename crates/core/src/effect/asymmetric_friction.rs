@@ -1,12 +1,12 @@
 //! `asymmetric-friction`: more friction in one direction, (coulomb + viscous v) H(v).
 
-use super::{Entry, Family, Key, Ladder, Law, Unit};
+use super::{Entry, Family, Key, Law, SpeedLadder, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "asymmetric-friction",
     families: &[Family::Velocity, Family::Offset],
     keys: &[Key::torque("coulomb"), Key::size("viscous", Unit::Viscous)],
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     friction: true,
     separate_by: "move the joint both ways at three or more constant speeds and hold it still \
                   between them: an offset holds at standstill, friction does not",

@@ -1,7 +1,7 @@
 //! A model with effects: what torque it reconstructs along whole stretches.
 
-use super::scene::{Scene, TiltTorques};
-use super::{Added, Place};
+use super::scene::{EffectScene, TiltTorques};
+use super::{EffectPlace, ModelEffect};
 use crate::motion::Stretch;
 use crate::robot::model::Model;
 
@@ -9,12 +9,12 @@ use crate::robot::model::Model;
 #[derive(Debug, Clone, PartialEq)]
 pub struct AugmentedModel {
     pub model: Model,
-    pub effects: Vec<Added>,
+    pub effects: Vec<ModelEffect>,
 }
 
 /// Torques along one stretch, `[joint][sample]`.
 #[derive(Debug, Clone, Default)]
-pub struct Torques {
+pub struct StretchTorques {
     /// Model and effects, before any shift in time.
     pub hat: Vec<Vec<f64>>,
     /// Inertial part alone.
@@ -40,7 +40,7 @@ impl AugmentedModel {
     }
 
     /// Torque before shifts, and load torque.
-    pub fn torques(&self, stretch: &Stretch) -> Torques {
+    pub fn torques(&self, stretch: &Stretch) -> StretchTorques {
         let n = self.model.robot.joints();
         let samples = stretch.len();
         let mut load = vec![vec![0.0; samples]; n];
@@ -60,7 +60,7 @@ impl AugmentedModel {
         let plain = hat.clone();
         let direction: Vec<Vec<f64>> = (0..n).map(|j| self.direction(stretch, j)).collect();
         let tilt = TiltTorques::new();
-        let scene = Scene {
+        let scene = EffectScene {
             robot: &self.model.robot,
             theta: &self.model.theta,
             laws: &self.model.friction,
@@ -81,7 +81,7 @@ impl AugmentedModel {
                 }
             }
         }
-        Torques {
+        StretchTorques {
             hat,
             load,
             direction,
@@ -91,7 +91,10 @@ impl AugmentedModel {
 
     /// Direction of a joint's friction where an effect makes smooth what jumps; else empty.
     pub(super) fn direction(&self, stretch: &Stretch, j: usize) -> Vec<f64> {
-        let mut own = self.effects.iter().filter(|e| e.place == Place::Joint(j));
+        let mut own = self
+            .effects
+            .iter()
+            .filter(|e| e.place == EffectPlace::Joint(j));
         let smooth = own.find_map(|e| Some((e.law.direction?, &e.shape)));
         match smooth.filter(|_| self.model.friction[j].jumps()) {
             Some((of, shape)) => stretch.v[j].iter().map(|v| of(shape, *v)).collect(),
@@ -110,7 +113,7 @@ impl AugmentedModel {
     }
 
     /// Measured less reconstructed torque, `[joint][sample]`, where the latter is known before shifts.
-    pub fn residual(&self, stretch: &Stretch, torques: &Torques) -> Vec<Vec<f64>> {
+    pub fn residual(&self, stretch: &Stretch, torques: &StretchTorques) -> Vec<Vec<f64>> {
         let mut residual = self.late(torques.hat.clone(), stretch.dt);
         for (e, tau) in residual.iter_mut().zip(&stretch.tau) {
             for (e, tau) in e.iter_mut().zip(tau) {

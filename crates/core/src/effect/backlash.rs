@@ -2,8 +2,8 @@
 //! what lies behind it: c sgn(v) is missing until the gap is used up, a fixed distance.
 
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit,
-    exact,
+    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan,
+    SpeedLadder, Unit, exact,
 };
 use crate::robot::friction::sign;
 
@@ -14,10 +14,10 @@ pub static ENTRY: Entry = Entry {
         Key::shape("gap", Unit::Position).above_zero("must be above 0"),
         Key::torque("c"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[
         Rule::at_most(
-            Number::Key("gap"),
+            LimitedNumber::Key("gap"),
             Limit::Backlash,
             "the play of a gear is at most 0.03 rad or 2 mm, of a harmonic or direct drive none, or what \
              [drive] declares",
@@ -25,7 +25,7 @@ pub static ENTRY: Entry = Entry {
         Rule::not_negative("c", "play takes torque away, and adds none"),
     ],
     otherwise: Some(CurveSignal::Way),
-    ladder: Some(Ladder::NARROW),
+    ladder: Some(SpeedLadder::NARROW),
     separate_by: "log reversals at several amplitudes (a gap keeps its width, a presliding loop shrinks \
                   with the amplitude)",
     formula: "-c sgn(v) inside the play operator's gap",

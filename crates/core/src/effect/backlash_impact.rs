@@ -7,7 +7,10 @@
 //! contact what takes dz/dt away within a sample.
 
 use super::elasticity::inertia;
-use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit, exact};
+use super::{
+    Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan, SpeedLadder, Unit,
+    exact,
+};
 use crate::robot::JointKind;
 
 pub static ENTRY: Entry = Entry {
@@ -18,17 +21,17 @@ pub static ENTRY: Entry = Entry {
         Key::size("inertia", Unit::Inertia)
             .above_zero("must be above 0, and below the joint's least"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[
         Rule::at_most(
-            Number::Key("gap"),
+            LimitedNumber::Key("gap"),
             Limit::Backlash,
             "the play of a gear is at most 0.03 rad or 2 mm, of a harmonic or direct drive none, or what \
              [drive] declares",
         ),
         Rule::not_negative("inertia", "a body behind a play has mass"),
     ],
-    ladder: Some(Ladder::NARROW),
+    ladder: Some(SpeedLadder::NARROW),
     separate_by: "hold the motor still and turn the load by hand from end to end of the play; log positions on both sides",
     formula: "inertia d2z/dt2 of a load of that inertia behind a play of width gap, z its position over the motor's: \
               it flies while it is not pushed, and takes the motor's speed where it lands",

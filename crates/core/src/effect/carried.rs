@@ -5,7 +5,7 @@
 //! Files and tables have first moments in the place of the centre: mx = mass x.
 
 use super::payload;
-use super::{KeyValue, Law, Property, Reparametrisation, ShapeSpan};
+use super::{EffectReparametrisation, KeyValue, Law, RobotProperty, ShapeSpan};
 use crate::robot::standard::Body;
 use crate::robot::tree::MOST_JOINTS;
 
@@ -26,7 +26,7 @@ pub static LAW: Law = Law {
         Ok(corners.collect())
     },
     limits: |_, _, _| vec![ShapeSpan::of(-MAX_DISTANCE_M, MAX_DISTANCE_M); 3],
-    reparametrised: Some(Reparametrisation {
+    reparametrised: Some(EffectReparametrisation {
         of_keys: |values| {
             let [mass, moments @ ..] = payload::body(values)?;
             let centre = moments.map(|moment| moment / mass);
@@ -59,7 +59,7 @@ pub static LAW: Law = Law {
         }
     }),
     property: |_, centre, linear| {
-        Some(Property::Body(Body {
+        Some(RobotProperty::Body(Body {
             mass: linear[0],
             centre: [centre[0], centre[1], centre[2]],
             inertia: [linear[1], 0.0, 0.0, linear[1], 0.0, linear[1]],

@@ -2,7 +2,8 @@
 //! points, as a cubic B-spline over the travel that was seen; constant beyond it.
 
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit, exact,
+    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, SpeedLadder,
+    Unit, exact,
 };
 use crate::robot::JointKind;
 
@@ -27,14 +28,14 @@ pub static ENTRY: Entry = Entry {
         Key::torque("m_5"),
         Key::torque("m_6"),
     ],
-    search: Search::Grid,
+    search: ShapeSearch::Grid,
     must: &[Rule::at_least(
-        Number::Weight,
+        LimitedNumber::Weight,
         Limit::Is(1.0),
         "the joint carries no weight that a counterbalance would carry",
     )],
     otherwise: Some(CurveSignal::Position),
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "log a slow sweep over the whole travel, both ways, with two payloads",
     formula: "d/dq of stiffness (l - free_length)^2/2, l between points at a and b from the \
                 axis; or a cubic B-spline on three pieces between from and to",

@@ -7,7 +7,9 @@
 //! joint j too: power is kept, so that both rows have the same three numbers, and nothing goes by joint j
 //! alone. That place is named by `both`.
 
-use super::{CodeSite, Entry, Family, Key, Ladder, Law, Place, Places, Rule, Search, Unit};
+use super::{
+    CodeSite, EffectPlace, Entry, Family, Key, Law, PlaceRule, Rule, ShapeSearch, SpeedLadder, Unit,
+};
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
@@ -21,15 +23,15 @@ pub static ENTRY: Entry = Entry {
         Key::torque("coulomb_from").or_zero(),
         Key::shape("r", Unit::CoupledRatio),
     ],
-    places: Places::Pairs,
-    search: Search::Grid,
+    places: PlaceRule::Pairs,
+    search: ShapeSearch::Grid,
     must: &[
         Rule::not_negative("viscous", TRAIN),
         Rule::not_negative("coulomb", TRAIN),
         Rule::not_negative("inertia", TRAIN),
         Rule::not_negative("coulomb_from", TRAIN),
     ],
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "move the other joint alone, both ways at several speeds",
     formula: "sgn(r) (viscous v_j + coulomb_from sgn(v_j) + inertia a_j) + coulomb sgn(v_i + r v_j) of joint \
                 j = from, counted from 1",
@@ -57,8 +59,8 @@ pub static LAW: Law = Law {
     starts: |cover, place| {
         let reverses = |j: usize| cover.joints[j].reversals >= 2;
         match place {
-            Place::Pair { of, .. } if reverses(of) => Ok(vec![vec![1.0], vec![-1.0]]),
-            Place::Geared { motor, other } if reverses(motor) && reverses(other) => {
+            EffectPlace::Pair { of, .. } if reverses(of) => Ok(vec![vec![1.0], vec![-1.0]]),
+            EffectPlace::Geared { motor, other } if reverses(motor) && reverses(other) => {
                 Ok(vec![vec![1.0], vec![-1.0]])
             }
             _ => Err("the other joint reverses fewer than two times".into()),
@@ -72,17 +74,17 @@ pub static LAW: Law = Law {
             let (s, k, r) = (at.scene.stretch, at.k, at.shape[0]);
             // whose motion the row gets, what turns the motor, and how the row sees the motor
             let (of, [a, b], scale, lever) = match at.place {
-                Place::Pair { on, of } => (of, [on, of], sign(r), 1.0),
-                Place::Geared { motor, other } if at.joint == motor => {
+                EffectPlace::Pair { on, of } => (of, [on, of], sign(r), 1.0),
+                EffectPlace::Geared { motor, other } if at.joint == motor => {
                     (other, [motor, other], r, 1.0)
                 }
-                Place::Geared { motor, other } => (motor, [motor, other], r, r),
+                EffectPlace::Geared { motor, other } => (motor, [motor, other], r, r),
                 _ => return,
             };
             out[0] = scale * s.v[of][k];
             out[1] = lever * sign(s.v[a][k] + r * s.v[b][k]);
             out[2] = scale * s.a[of][k];
-            if matches!(at.place, Place::Pair { .. }) {
+            if matches!(at.place, EffectPlace::Pair { .. }) {
                 out[3] = scale * sign(s.v[of][k]);
             }
         },
@@ -93,7 +95,7 @@ pub static LAW: Law = Law {
 fn written(to: &mut CodeSite) {
     let [viscous, coulomb, inertia, from, r] = [to.x(0), to.x(1), to.x(2), to.x(3), to.s(0)];
     match to.place {
-        Place::Geared { motor, other } => {
+        EffectPlace::Geared { motor, other } => {
             let name = format!("shared_{}", to.number);
             to.now(format!(
                 "let {name} = {coulomb} * $sign(v[{motor}] + {r} * v[{other}]);"
@@ -105,7 +107,7 @@ fn written(to: &mut CodeSite) {
                 "tau[{other}] += {viscous} * ({r} * v[{motor}]) + {r} * {name} + {inertia} * ({r} * a[{motor}]);"
             ));
         }
-        Place::Pair { on, of } => {
+        EffectPlace::Pair { on, of } => {
             let turning = format!("$sign(v[{on}] + {r} * v[{of}])");
             to.added(format!(
                 "$sign({r}) * ({viscous} * v[{of}] + {from} * $sign(v[{of}]) + {inertia} * a[{of}]) + {coulomb} * \

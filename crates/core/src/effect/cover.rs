@@ -1,6 +1,6 @@
 //! What a set of logs covers: by this an effect is refused that the data cannot show.
 
-use super::Place;
+use super::EffectPlace;
 use crate::motion::{Stretch, alike};
 use crate::robot::{JointKind, Robot};
 
@@ -33,7 +33,7 @@ pub struct JointCover {
 
 /// What the logs cover.
 #[derive(Debug, Clone, Default)]
-pub struct Cover {
+pub struct LogCoverage {
     pub joints: Vec<JointCover>,
     pub kinds: Vec<JointKind>,
     /// Longest log \[s\].
@@ -44,11 +44,11 @@ pub struct Cover {
     pub cutoff_hz: f64,
 }
 
-impl Cover {
+impl LogCoverage {
     /// Looks over stretches.
     pub fn of(robot: &Robot, stretches: &[Stretch], cutoff_hz: f64) -> Self {
         let n = robot.joints();
-        let mut cover = Cover {
+        let mut cover = LogCoverage {
             joints: vec![JointCover::default(); n],
             kinds: (0..n).map(|j| robot.joint_kind(j)).collect(),
             duration_s: 0.0,
@@ -89,14 +89,14 @@ impl Cover {
     }
 
     /// What the joint of a place did; the first joint's for all of them.
-    pub fn at(&self, place: Place) -> &JointCover {
+    pub fn at(&self, place: EffectPlace) -> &JointCover {
         &self.joints[place.joint().unwrap_or(0).min(self.joints.len() - 1)]
     }
 
     /// What the joint of a place did where it reversed so often; else what the data lack.
     pub(super) fn reversing(
         &self,
-        place: Place,
+        place: EffectPlace,
         times: usize,
         lack: &str,
     ) -> Result<&JointCover, String> {
@@ -106,7 +106,7 @@ impl Cover {
     }
 
     /// The same of a joint that moved both ways with speeds worth the name.
-    pub(super) fn both_ways(&self, place: Place) -> Result<&JointCover, String> {
+    pub(super) fn both_ways(&self, place: EffectPlace) -> Result<&JointCover, String> {
         let lack = "the joint moves in one direction only: move it both ways";
         let joint = self.reversing(place, 1, lack)?;
         let [back, forth] = joint.speed;
@@ -115,7 +115,7 @@ impl Cover {
     }
 
     /// Travel of a place's joint in revolutions or metres.
-    pub(super) fn travel(&self, place: Place) -> f64 {
+    pub(super) fn travel(&self, place: EffectPlace) -> f64 {
         let joint = place.joint().unwrap_or(0);
         let range = self.joints[joint].range();
         match self.kinds[joint] {

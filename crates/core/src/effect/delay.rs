@@ -1,16 +1,16 @@
 //! `delay`: the logged torque is late by d (early where d is negative), on one joint or on all.
 
-use super::{Entry, Family, Key, Law, Limit, Number, Places, Role, Rule, Unit};
+use super::{Entry, Family, Key, Law, Limit, LimitedNumber, PlaceRule, Role, Rule, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
     name: "delay",
     families: &[Family::Timing],
     keys: &[Key::size("d", Unit::Fixed("s"))],
-    places: Places::JointsOrAll,
+    places: PlaceRule::JointsOrAll,
     role: Role::Shift,
     must: &[Rule::at_most(
-        Number::Size("d"),
+        LimitedNumber::Size("d"),
         Limit::Is(0.1),
         "clocks and filters of drives differ by less than 0.1 s",
     )],

@@ -1,6 +1,6 @@
 //! `drive-efficiency`: a loss in proportion to the load while the motor drives it, k tau_l H(tau_l v).
 
-use super::{CurveSignal, Entry, Family, Key, Law, Limit, Number, Rule, Unit};
+use super::{CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -13,7 +13,7 @@ pub static ENTRY: Entry = Entry {
     )],
     must: &[
         Rule::not_negative("k", LOSS),
-        Rule::at_most(Number::Key("k"), Limit::Is(0.6), LOSS),
+        Rule::at_most(LimitedNumber::Key("k"), Limit::Is(0.6), LOSS),
     ],
     otherwise: Some(CurveSignal::Load),
     friction: true,

@@ -8,8 +8,8 @@
 use nalgebra::Matrix4;
 
 use super::{
-    Entry, Family, Key, KeyValue, Law, Limit, Number, Reparametrisation, Rule, Scene, Search,
-    ShapeSpan, Unit, exact,
+    EffectReparametrisation, EffectScene, Entry, Family, Key, KeyValue, Law, Limit, LimitedNumber,
+    Rule, ShapeSearch, ShapeSpan, Unit, exact,
 };
 
 pub static ENTRY: Entry = Entry {
@@ -22,17 +22,17 @@ pub static ENTRY: Entry = Entry {
         ),
         Key::shape("damping", Unit::One).within(0.0, f64::INFINITY, "must not be below 0"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[
         Rule::not_negative("inertia", "a body behind a spring has mass"),
         Rule::not_negative("stiffness", "a spring pushes back"),
         Rule::at_most(
-            Number::Key("damping"),
+            LimitedNumber::Key("damping"),
             Limit::Is(0.5),
             "a gear, belt or shaft rings: its damping ratio is below 0.5",
         ),
         Rule::at_least(
-            Number::Ratio("stiffness", "inertia"),
+            LimitedNumber::Ratio("stiffness", "inertia"),
             Limit::MotionSquared(4.0),
             "its frequency lies within the motion's band, where a delay or a coupling does the same",
         ),
@@ -60,7 +60,7 @@ pub static LAW: Law = Law {
         vec![frequency, ShapeSpan::of(1e-3, 1.0).open_below()]
     },
     // stiffness = inertia (2 pi frequency)^2
-    reparametrised: Some(Reparametrisation {
+    reparametrised: Some(EffectReparametrisation {
         of_keys: |values| {
             let (stiffness, inertia) = (values.get("stiffness")?, values.get("inertia")?);
             let square = stiffness / inertia;
@@ -159,7 +159,7 @@ fn next(step: &[f64], z: [f64; 2], before: f64, after: f64) -> [f64; 2] {
 }
 
 /// M_jj in the middle of the stretch: the column of a unit acceleration less that of none.
-pub(super) fn inertia(scene: &Scene, j: usize) -> f64 {
+pub(super) fn inertia(scene: &EffectScene, j: usize) -> f64 {
     let n = scene.robot.joints();
     let p = scene.theta.len();
     let k = scene.len() / 2;

@@ -4,7 +4,9 @@
 use std::sync::LazyLock;
 
 use super::signal::{CurveSignal, SIGNALS};
-use super::{Added, CodeSite, Entry, Family, Key, Law, Role, Scene, Search, Unit, exact};
+use super::{
+    CodeSite, EffectScene, Entry, Family, Key, Law, ModelEffect, Role, ShapeSearch, Unit, exact,
+};
 use crate::number;
 
 /// Knots of the spline.
@@ -38,7 +40,7 @@ pub static ENTRY: Entry = Entry {
         Key::torque("m_6"),
     ],
     role: Role::StandIn,
-    search: Search::Grid,
+    search: ShapeSearch::Grid,
     separate_by: "log the same motion with another payload, another routing of the cables, or a second sensor",
     formula: "a natural cubic spline through m_1..m_6 at six equal steps between from and to of q (signal \
               1), q by direction (2), v (3), tau_l by direction (4) or the way since the last reversal by \
@@ -106,7 +108,7 @@ impl CurveSignal {
     }
 
     /// The signal at sample k; the position where the way hangs on samples before.
-    fn value(self, scene: &Scene, j: usize, k: usize) -> f64 {
+    fn value(self, scene: &EffectScene, j: usize, k: usize) -> f64 {
         match self {
             CurveSignal::Position | CurveSignal::Friction | CurveSignal::Way => {
                 scene.stretch.q[j][k]
@@ -117,7 +119,7 @@ impl CurveSignal {
     }
 
     /// Ends of the curve to try on these scenes; none where nothing moves.
-    pub fn ends(self, scenes: &[Scene], j: usize, range: f64) -> Vec<[f64; 2]> {
+    pub fn ends(self, scenes: &[EffectScene], j: usize, range: f64) -> Vec<[f64; 2]> {
         if self == CurveSignal::Way {
             return [0.03, 0.1, 0.3].map(|share| [0.0, share * range]).to_vec();
         }
@@ -204,7 +206,7 @@ fn cubes(values: &[f64]) -> Vec<f64> {
     out
 }
 
-impl Added {
+impl ModelEffect {
     /// Signal and greatest torque of a curve in place of a law; none of a named effect.
     pub fn curve(&self) -> Option<(CurveSignal, f64)> {
         if self.law.entry.role != Role::StandIn {

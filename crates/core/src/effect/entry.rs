@@ -1,7 +1,7 @@
 //! What is known of an effect, whoever models it. The estimator and the simulator read the same entries and
 //! have laws of their own, so that each checks the other.
 
-use super::{CurveSignal, Facts, Places, Rule, Unit};
+use super::{CurveSignal, EffectFacts, PlaceRule, Rule, Unit};
 
 /// Families of effects that look alike: named first, the member only where the data separate it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,7 +58,7 @@ pub enum Role {
 
 /// What the search does with the parameters that shape an effect's columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Search {
+pub enum ShapeSearch {
     /// There are none.
     Linear,
     /// The best of a few is taken as it is.
@@ -71,37 +71,37 @@ pub enum Search {
     Orders,
 }
 
-impl Search {
+impl ShapeSearch {
     /// Whether shapes are refined, and not only chosen.
     pub fn refines(self) -> bool {
-        matches!(self, Search::Refined | Search::Orders)
+        matches!(self, ShapeSearch::Refined | ShapeSearch::Orders)
     }
 }
 
 /// A motion of one joint alone, both ways at ten speeds over its range.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ladder {
+pub struct SpeedLadder {
     /// Duration \[s\].
     pub seconds: u32,
     /// Share of the range, where it is not the whole.
     pub travel: Option<f64>,
 }
 
-impl Ladder {
+impl SpeedLadder {
     /// As long as a person waits for.
-    pub const USUAL: Ladder = Ladder {
+    pub const USUAL: SpeedLadder = SpeedLadder {
         seconds: 60,
         travel: None,
     };
     /// Beside logs over the whole range: a gap keeps its width, a loop shrinks with the amplitude.
-    pub(crate) const NARROW: Ladder = Ladder {
+    pub(crate) const NARROW: SpeedLadder = SpeedLadder {
         travel: Some(0.1),
-        ..Ladder::USUAL
+        ..SpeedLadder::USUAL
     };
     /// Long enough for friction to warm up.
-    pub const LONG: Ladder = Ladder {
+    pub const LONG: SpeedLadder = SpeedLadder {
         seconds: 600,
-        ..Ladder::USUAL
+        ..SpeedLadder::USUAL
     };
 }
 
@@ -202,9 +202,9 @@ pub struct Entry {
     /// That which results name, then others that it looks like.
     pub families: &'static [Family],
     pub keys: &'static [Key],
-    pub places: Places,
+    pub places: PlaceRule,
     pub role: Role,
-    pub search: Search,
+    pub search: ShapeSearch,
     /// Whether its torque is the same while its joint rests. Friction takes any torque there.
     pub at_rest: bool,
     /// Whether it is friction: with all other friction of its joints it takes power.
@@ -216,7 +216,7 @@ pub struct Entry {
     /// The signal over which a curve takes its place where they do not.
     pub otherwise: Option<CurveSignal>,
     /// The motion that separates it from its like; none where it takes a payload, a standstill or other sensors.
-    pub ladder: Option<Ladder>,
+    pub ladder: Option<SpeedLadder>,
     /// The experiment that separates it, as what to do.
     pub separate_by: &'static str,
     /// Torque that it adds, or what it does to a log.
@@ -224,7 +224,7 @@ pub struct Entry {
     /// Where it comes from in a machine, and who wrote of it.
     pub source: &'static str,
     /// What it is called where it was found, with the numbers that a person asks for; nothing for a fault.
-    pub said: fn(&Facts) -> String,
+    pub said: fn(&EffectFacts) -> String,
     /// What to do about it.
     pub remedy: &'static str,
     /// Why it is no torque that a controller could send, where it is none.
@@ -237,9 +237,9 @@ impl Entry {
         name: "",
         families: &[],
         keys: &[],
-        places: Places::Joints,
+        places: PlaceRule::Joints,
         role: Role::Columns,
-        search: Search::Linear,
+        search: ShapeSearch::Linear,
         at_rest: false,
         friction: false,
         measurable: false,

@@ -6,7 +6,7 @@ use crate::robot::JointKind;
 
 /// An effect with its numbers, for the words of its entry.
 #[derive(Debug, Clone)]
-pub struct Facts {
+pub struct EffectFacts {
     /// Joint or screw that it sits at; `all joints`.
     pub at: String,
     /// The other joint, whose motion counts too.
@@ -20,7 +20,7 @@ pub struct Facts {
     pub torque: String,
 }
 
-impl Facts {
+impl EffectFacts {
     /// The number of a key; not a number where there is none.
     pub fn value(&self, key: &str) -> f64 {
         let found = self.numbers.iter().find(|(k, _, _)| k == key);
@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn a_wave_is_named_by_its_pitch_on_a_slide_and_by_its_number_on_a_turning_joint() {
         let number = |key: &str, value| (key.to_owned(), value, "N".to_owned());
-        let mut facts = Facts {
+        let mut facts = EffectFacts {
             at: "q1".into(),
             with: String::new(),
             kind: JointKind::Prismatic,

@@ -3,20 +3,20 @@
 use std::collections::BTreeSet;
 
 use super::formula_state::FormulaState;
-use super::{Instant, Place, exact};
+use super::{EffectPlace, Instant, exact};
 use crate::explain::Explain;
 use crate::math::formula::{Formula, MOST_NAMES};
 use crate::robot::{FormulaSignal, Robot};
 
 /// What a formula effect is made of, by name.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Definition {
+pub struct FormulaDefinition {
     pub name: String,
     /// Joints at which it may sit; none for all.
     pub joints: Option<Vec<String>>,
     /// Name, unit and formula of each coefficient.
     pub coefficients: Vec<[String; 3]>,
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<FormulaShape>,
     pub friction: bool,
     /// Whether its torque is the same at rest.
     pub at_rest: bool,
@@ -25,7 +25,7 @@ pub struct Definition {
 
 /// A number that shapes the formulas.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Shape {
+pub struct FormulaShape {
     pub name: String,
     pub unit: String,
     /// Least and largest value that is searched.
@@ -76,7 +76,7 @@ pub enum FormulaError {
 }
 
 /// A compiled effect of a user's own.
-pub struct Formulas {
+pub struct FormulaEffect {
     /// Joints at which it may sit.
     joints: Vec<usize>,
     columns: Vec<Column>,
@@ -98,9 +98,9 @@ enum Input {
     Shape(usize),
 }
 
-impl Formulas {
+impl FormulaEffect {
     /// Reads the formulas of a definition.
-    pub(super) fn of(definition: &Definition, robot: &Robot) -> Result<Self, FormulaError> {
+    pub(super) fn of(definition: &FormulaDefinition, robot: &Robot) -> Result<Self, FormulaError> {
         let name = &definition.name;
         let names = robot.joint_names();
         let place = |joint: &String| {
@@ -151,7 +151,7 @@ impl Formulas {
             Ok(Column { formula, inputs })
         };
         let columns = definition.coefficients.iter().map(column);
-        Ok(Formulas {
+        Ok(FormulaEffect {
             joints,
             columns: columns.collect::<Result<_, _>>()?,
             ranges: definition.shapes.iter().map(|s| s.range).collect(),
@@ -159,7 +159,7 @@ impl Formulas {
     }
 
     /// Whether it may sit at a place.
-    pub(super) fn fits(&self, place: Place) -> bool {
+    pub(super) fn fits(&self, place: EffectPlace) -> bool {
         place.joint().is_some_and(|j| self.joints.contains(&j))
     }
 
@@ -268,7 +268,7 @@ impl Formulas {
 }
 
 /// What a name in a formula means.
-fn input(variable: &str, definition: &Definition, joints: &[String]) -> Option<Input> {
+fn input(variable: &str, definition: &FormulaDefinition, joints: &[String]) -> Option<Input> {
     if let Some(i) = definition.shapes.iter().position(|s| s.name == variable) {
         return Some(Input::Shape(i));
     }

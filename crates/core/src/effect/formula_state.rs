@@ -1,6 +1,6 @@
 //! Signals of formulas along a motion, and what those that remember keep from sample to sample.
 
-use super::Scene;
+use super::EffectScene;
 use crate::robot::FormulaSignal;
 use crate::robot::friction::sign;
 
@@ -16,7 +16,7 @@ impl FormulaState<'_> {
         &mut self,
         signal: FormulaSignal,
         scale: f64,
-        scene: &Scene,
+        scene: &EffectScene,
         (joint, k): (usize, usize),
     ) -> f64 {
         let s = scene.stretch;
@@ -54,7 +54,7 @@ impl FormulaState<'_> {
 
 impl FormulaSignal {
     /// Of a joint at sample k; no number for one that remembers.
-    pub(super) fn at(self, scene: &Scene, joint: usize, k: usize) -> f64 {
+    pub(super) fn at(self, scene: &EffectScene, joint: usize, k: usize) -> f64 {
         let s = scene.stretch;
         match self {
             Self::Position => s.q[joint][k],
@@ -73,7 +73,7 @@ impl FormulaSignal {
     }
 
     /// Of a joint along a scene, with its scale where it has one.
-    pub(crate) fn series(self, scene: &Scene, joint: usize, scale: Option<f64>) -> Vec<f64> {
+    pub(crate) fn series(self, scene: &EffectScene, joint: usize, scale: Option<f64>) -> Vec<f64> {
         let mut kept = [f64::NAN; FormulaState::SIZE];
         let mut state = FormulaState(&mut kept);
         let mut next = |k| match self.remembers() {

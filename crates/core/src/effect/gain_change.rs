@@ -2,7 +2,7 @@
 //! 1 + k (1 - exp(-x/scale)) times the torque that acts, x the time since the log began (signal 1) or the size of
 //! that torque (signal 2). A fit absorbs a constant gain, and not one that changes along the log.
 
-use super::{CodeSite, Entry, Family, Instant, Key, Law, Search, ShapeSpan, Unit};
+use super::{CodeSite, Entry, Family, Instant, Key, Law, ShapeSearch, ShapeSpan, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -13,7 +13,7 @@ pub static ENTRY: Entry = Entry {
         Key::shape("scale", Unit::Signal).above_zero("must be above 0"),
         Key::size("k", Unit::One).within(-0.9, 9.0, "must lie in -0.9..9"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     separate_by: "hold a known weight still at the start and at the end of a log, and hold two weights of which one \
                   takes near the highest current",
     formula: "k (1 - exp(-x/scale)) times the acting torque, x the time (signal 1) or the size of that torque (signal 2)",

@@ -1,11 +1,11 @@
 //! `gravity-tilt`: gravity has components gx and gy along the base's x and y, which the model does not
 //! know: a base that stands askew. Two numbers explain it on all joints; the columns are those of
-//! [`Tilt`](crate::robot::undeclared::Tilt).
+//! [`BaseTilt`](crate::robot::undeclared::BaseTilt).
 
-use super::{CodeSite, Entry, Family, Instant, Key, Law, Places, Property, Unit, exact};
+use super::{CodeSite, Entry, Family, Instant, Key, Law, PlaceRule, RobotProperty, Unit, exact};
 use crate::number;
 use crate::robot::tree::MOST_JOINTS;
-use crate::robot::undeclared::Tilt;
+use crate::robot::undeclared::BaseTilt;
 
 pub static ENTRY: Entry = Entry {
     name: "gravity-tilt",
@@ -14,7 +14,7 @@ pub static ENTRY: Entry = Entry {
         Key::size("gx", Unit::Fixed("m/s^2")),
         Key::size("gy", Unit::Fixed("m/s^2")),
     ],
-    places: Places::Whole,
+    places: PlaceRule::Whole,
     separate_by: "log the same motion with the arm turned by a quarter and by half a turn about q2",
     formula: "slope of -sum m_i (gx p_x + gy p_y) over the chain; a sliding axis along x: \
                 -inertia gx",
@@ -32,12 +32,12 @@ pub static ENTRY: Entry = Entry {
 pub static LAW: Law = Law {
     fits: |robot, _, _| robot.knows_links(),
     code: Some(|to| to.tilted()),
-    property: |_, _, linear| Some(Property::Gravity([linear[0], linear[1]])),
+    property: |_, _, linear| Some(RobotProperty::Gravity([linear[0], linear[1]])),
     ..Law::linear(&ENTRY, &["gx", "gy"], columns)
 };
 
 fn columns(at: &Instant, _: &mut [f64], out: &mut [f64]) {
-    let torques = |tilt: &Tilt, at: Instant| {
+    let torques = |tilt: &BaseTilt, at: Instant| {
         let ([q, ..], n) = (at.state::<MOST_JOINTS>(), at.scene.robot.joints());
         let mut torques = [[0.0; 2]; MOST_JOINTS];
         tilt.torques(&q[..n], &mut torques[..n]);

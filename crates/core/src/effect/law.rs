@@ -1,15 +1,16 @@
 //! How the estimator sees an effect: columns of torque along a recorded motion, linear in some parameters and
 //! shaped by others.
 
-use super::formula::Formulas;
+use super::formula::FormulaEffect;
 use super::{
-    CodeSite, Cover, EffectError, Entry, Family, Instant, Place, Property, ShapeSpan, Unit, Values,
+    CodeSite, EffectError, EffectPlace, EffectValues, Entry, Family, Instant, LogCoverage,
+    RobotProperty, ShapeSpan, Unit,
 };
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
 /// Shapes to begin the search from, or what the data lack for the effect.
-pub type Starts = Result<Vec<Vec<f64>>, String>;
+pub type ShapeStarts = Result<Vec<Vec<f64>>, String>;
 
 /// Columns of a joint at one sample: what the law keeps from the one before, and a number for each coefficient, 0 before.
 pub(super) type Columns = fn(&Instant, &mut [f64], &mut [f64]);
@@ -18,15 +19,15 @@ pub(super) type Columns = fn(&Instant, &mut [f64], &mut [f64]);
 pub struct Law {
     pub entry: &'static Entry,
     /// Whether it can sit at one of the entry's places on this robot.
-    pub(super) fits: fn(&Robot, &[JointFriction], Place) -> bool,
+    pub(super) fits: fn(&Robot, &[JointFriction], EffectPlace) -> bool,
     /// Parameters that shape the columns, searched.
     pub shape: &'static [&'static str],
     /// Coefficients of the columns, one each.
     pub linear: &'static [&'static str],
     /// Shapes to try on these data, or what they lack.
-    pub(super) starts: fn(&Cover, Place) -> Starts,
+    pub(super) starts: fn(&LogCoverage, EffectPlace) -> ShapeStarts,
     /// Range of each shape parameter that is refined, the first of the shape, about a shape on these data.
-    pub(super) limits: fn(&Cover, Place, &[f64]) -> Vec<ShapeSpan>,
+    pub(super) limits: fn(&LogCoverage, EffectPlace, &[f64]) -> Vec<ShapeSpan>,
     pub(super) columns: Columns,
     /// How many numbers it keeps from sample to sample, NaN at the begin of a stretch, where a column depends on samples
     /// before it.
@@ -34,28 +35,28 @@ pub struct Law {
     /// Direction of the joint's friction at a speed, where the effect makes it smooth: shape, speed.
     pub direction: Option<fn(&[f64], f64) -> f64>,
     /// Family and whether it is the same torque at rest, where these hang on the shape.
-    pub varied: Option<Varied>,
+    pub varied: Option<FamilyByShape>,
     /// Unit of the keys whose unit is the signal's, by the shape.
     pub(super) signal_unit: Option<fn(&[f64]) -> Unit>,
     /// Part of a shape by which it is moved for the slope of its torque.
     pub slope_step: f64,
     /// Formulas of a user's own, in place of the functions above.
-    pub formula: Option<&'static Formulas>,
+    pub formula: Option<&'static FormulaEffect>,
     /// What it adds to generated code; formulas write their own.
     pub(super) code: Option<fn(&mut CodeSite)>,
     /// The property of links, drives or the base that it is, where it is one: place, shape, coefficients.
-    pub(super) property: fn(Place, &[f64], &[f64]) -> Option<Property>,
+    pub(super) property: fn(EffectPlace, &[f64], &[f64]) -> Option<RobotProperty>,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
-    pub(super) reparametrised: Option<Reparametrisation>,
+    pub(super) reparametrised: Option<EffectReparametrisation>,
 }
 
 /// Family and whether it is the same torque at rest, by the shape.
-pub type Varied = fn(&[f64]) -> (Family, bool);
+pub type FamilyByShape = fn(&[f64]) -> (Family, bool);
 
 /// Two ways to say the numbers of one effect.
-pub(super) struct Reparametrisation {
+pub(super) struct EffectReparametrisation {
     /// Shape and coefficients of the keys in a file.
-    pub of_keys: fn(&Values) -> Result<[Vec<f64>; 2], EffectError>,
+    pub of_keys: fn(&EffectValues) -> Result<[Vec<f64>; 2], EffectError>,
     /// The keys, in the order in which they are reported, of shape and coefficients.
     pub to_keys: fn(&[f64], &[f64]) -> Vec<KeyValue>,
 }
@@ -97,9 +98,9 @@ impl Law {
     }
 
     /// Where on this robot it can sit.
-    pub fn places(&self, robot: &Robot, laws: &[JointFriction]) -> Vec<Place> {
+    pub fn places(&self, robot: &Robot, laws: &[JointFriction]) -> Vec<EffectPlace> {
         let mut places = self.entry.places.on(robot);
-        let fits = |place: Place| match self.formula {
+        let fits = |place: EffectPlace| match self.formula {
             Some(formula) => formula.fits(place),
             None => (self.fits)(robot, laws, place),
         };
@@ -121,7 +122,7 @@ impl Law {
     }
 
     /// Shape and coefficients of numbers in a file.
-    pub(super) fn of_keys(&self, values: &Values) -> Result<[Vec<f64>; 2], EffectError> {
+    pub(super) fn of_keys(&self, values: &EffectValues) -> Result<[Vec<f64>; 2], EffectError> {
         if let Some(with) = &self.reparametrised {
             return (with.of_keys)(values);
         }
@@ -144,7 +145,7 @@ impl Law {
 }
 
 /// Whether a joint's declared friction jumps at rest, or there is none: a smooth law has a fall at low speed of its own.
-pub(super) fn jumps_or_is_none(_: &Robot, laws: &[JointFriction], place: Place) -> bool {
+pub(super) fn jumps_or_is_none(_: &Robot, laws: &[JointFriction], place: EffectPlace) -> bool {
     let law = place.joint().map(|j| laws[j]);
     !matches!(law, Some(JointFriction::DoubleTanh(_)))
 }

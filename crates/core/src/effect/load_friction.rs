@@ -2,7 +2,9 @@
 //! (Hamon, Gautier and Garrec 2010).
 
 use crate::math::hyperbolic::tanh;
-use super::{CurveSignal, Entry, Family, Key, Law, Limit, Number, Rule, Search, ShapeSpan, Unit};
+use super::{
+    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan, Unit,
+};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -13,11 +15,15 @@ pub static ENTRY: Entry = Entry {
         Key::size("mu_v", Unit::Slope),
         Key::shape("w", Unit::Slope),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     // mu_v may be negative as long as the load still rubs at top speed
     must: &[
         Rule::not_negative("mu_c", LOADED),
-        Rule::at_least(Number::AtTopSpeed("mu_c", "mu_v"), Limit::Is(0.0), LOADED),
+        Rule::at_least(
+            LimitedNumber::AtTopSpeed("mu_c", "mu_v"),
+            Limit::Is(0.0),
+            LOADED,
+        ),
     ],
     otherwise: Some(CurveSignal::Load),
     friction: true,

@@ -29,28 +29,28 @@ mod values;
 
 use std::collections::BTreeMap;
 
-pub use added::{Added, EffectNumber};
-pub use augmented_model::{AugmentedModel, Torques, shifted};
-pub use cover::{Cover, JointCover, stationary_joints};
-pub use entry::{Entry, Family, Key, Ladder, Range, Role, Search};
-pub use facts::Facts;
+pub use added::{EffectNumber, ModelEffect};
+pub use augmented_model::{AugmentedModel, StretchTorques, shifted};
+pub use cover::{JointCover, LogCoverage, stationary_joints};
+pub use entry::{Entry, Family, Key, Range, Role, ShapeSearch, SpeedLadder};
+pub use facts::EffectFacts;
 pub use law::Law;
 pub use order::is_whole as order_is_whole;
-pub use physics::{Limit, Number, Rule, Seen};
-pub use place::{Place, Places};
-pub use sampled::Sampled;
-pub use scene::Scene;
+pub use physics::{Limit, LimitContext, LimitedNumber, Rule};
+pub use place::{EffectPlace, PlaceRule};
+pub use sampled::SampledModel;
+pub use scene::EffectScene;
 pub use shape_range::ShapeSpan;
 pub use signal::CurveSignal;
 pub use unit::Unit;
-pub use values::{EffectError, Values};
+pub use values::{EffectError, EffectValues};
 
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
-use law::{KeyValue, Reparametrisation, jumps_or_is_none};
+use law::{EffectReparametrisation, KeyValue, jumps_or_is_none};
 use law_text::exact;
 use scene::Instant;
-use site::{CodeSite, Property};
+use site::{CodeSite, RobotProperty};
 
 /// Files of effects, and what each has in a list.
 macro_rules! catalogue {
@@ -141,7 +141,7 @@ pub fn read(
     name: &str,
     joint: Option<&str>,
     given: &BTreeMap<String, f64>,
-) -> Result<Added, EffectError> {
+) -> Result<ModelEffect, EffectError> {
     let law = law(robot, name).ok_or_else(|| EffectError::Unknown {
         name: name.to_owned(),
         known: names().collect::<Vec<_>>().join(", "),
@@ -158,15 +158,15 @@ pub fn read_as(
     robot: &Robot,
     joint: Option<&str>,
     given: &BTreeMap<String, f64>,
-) -> Result<Added, EffectError> {
-    let values = Values {
+) -> Result<ModelEffect, EffectError> {
+    let values = EffectValues {
         effect: law.entry.name,
         known: &law.key_names(),
         given,
     };
     let place = law.entry.places.named(robot, joint, &values)?;
     let [shape, linear] = law.of_keys(&values)?;
-    Ok(Added::new(law, place, shape, linear))
+    Ok(ModelEffect::new(law, place, shape, linear))
 }
 
 #[cfg(test)]
@@ -181,7 +181,7 @@ mod tests {
         for law in LAWS {
             let entry = law.entry;
             let number = |key: &Key| (key.name.to_owned(), 0.5, "N".to_owned());
-            let said = (entry.said)(&Facts {
+            let said = (entry.said)(&EffectFacts {
                 at: "q1".into(),
                 with: "q2".into(),
                 kind: JointKind::Prismatic,

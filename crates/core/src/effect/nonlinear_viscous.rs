@@ -1,6 +1,6 @@
 //! `nonlinear-viscous`: friction that bends with speed, c sgn(v) |v|^p.
 
-use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Search, ShapeSpan, Unit};
+use super::{CurveSignal, Entry, Family, Key, Law, ShapeSearch, ShapeSpan, SpeedLadder, Unit};
 use crate::number;
 use crate::robot::friction::sign;
 
@@ -15,8 +15,8 @@ pub static ENTRY: Entry = Entry {
             "must lie in 0.1..5; 0 is `asymmetric-friction` or Coulomb friction",
         ),
     ],
-    search: Search::Refined,
-    ladder: Some(Ladder::USUAL),
+    search: ShapeSearch::Refined,
+    ladder: Some(SpeedLadder::USUAL),
     friction: true,
     otherwise: Some(CurveSignal::Speed),
     separate_by: "log constant speeds, both ways, up to the top speed",

@@ -1,7 +1,7 @@
 //! Orders of what repeats with position: waves per revolution or metre.
 
-use super::law::Starts;
-use super::{CodeSite, Cover, Instant, Place, ShapeSpan, exact};
+use super::law::ShapeStarts;
+use super::{CodeSite, EffectPlace, Instant, LogCoverage, ShapeSpan, exact};
 use crate::robot::{JointKind, Robot};
 
 /// rad per rad or per metre of an order (1/rev or 1/m).
@@ -31,7 +31,7 @@ impl CodeSite<'_> {
 }
 
 /// Peaks of the spectrum that the travel covers; what is missing where there are none.
-pub(super) fn orders(cover: &Cover, place: Place, peaks: &[f64]) -> Starts {
+pub(super) fn orders(cover: &LogCoverage, place: EffectPlace, peaks: &[f64]) -> ShapeStarts {
     let travel = cover.travel(place);
     if travel * MOST_ORDER < LEAST_WAVES {
         return Err("the joint stands still: no order can be seen".into());
@@ -49,7 +49,7 @@ pub(super) fn orders(cover: &Cover, place: Place, peaks: &[f64]) -> Starts {
 
 /// Whether an order can be that of the place: after a full turn a joint is where it was, so that on
 /// one which turns further its orders are whole, within half of 1/travel.
-pub fn is_whole(cover: &Cover, place: Place, order: f64) -> bool {
+pub fn is_whole(cover: &LogCoverage, place: EffectPlace, order: f64) -> bool {
     let turns = cover.travel(place);
     let revolute = |j| cover.kinds[j] == JointKind::Revolute;
     let revolute = place.joint().is_some_and(revolute);
@@ -60,7 +60,7 @@ pub fn is_whole(cover: &Cover, place: Place, order: f64) -> bool {
 const FULL_TURNS: f64 = 1.5;
 
 /// Orders between what the travel covers and what the position filter lets through.
-pub(super) fn order_limits(cover: &Cover, place: Place, _: &[f64]) -> Vec<ShapeSpan> {
+pub(super) fn order_limits(cover: &LogCoverage, place: EffectPlace, _: &[f64]) -> Vec<ShapeSpan> {
     let travel = cover.travel(place).max(f64::MIN_POSITIVE);
     vec![ShapeSpan::of(LEAST_WAVES / travel, MOST_ORDER).open_above()]
 }

@@ -2,18 +2,18 @@
 
 use std::sync::Mutex;
 
-use super::formula::{Definition, FormulaError, Formulas};
-use super::law::{Law, Starts};
-use super::{Cover, Entry, Family, Instant, Key, Place, Search, ShapeSpan, Unit};
+use super::formula::{FormulaDefinition, FormulaEffect, FormulaError};
+use super::law::{Law, ShapeStarts};
+use super::{EffectPlace, Entry, Family, Instant, Key, LogCoverage, ShapeSearch, ShapeSpan, Unit};
 use crate::robot::Robot;
 
 /// Laws that have been made: a definition is read for every command and every file, and is the same law.
-static MADE: Mutex<Vec<(Definition, Vec<String>, &'static Law)>> = Mutex::new(Vec::new());
+static MADE: Mutex<Vec<(FormulaDefinition, Vec<String>, &'static Law)>> = Mutex::new(Vec::new());
 
 /// The law of a definition on a robot. It lives as long as the program: the same definition gives the same law.
-pub fn law(definition: &Definition, robot: &Robot) -> Result<&'static Law, FormulaError> {
+pub fn law(definition: &FormulaDefinition, robot: &Robot) -> Result<&'static Law, FormulaError> {
     let mut made = MADE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let same = |(d, joints, _): &&(Definition, Vec<String>, &'static Law)| {
+    let same = |(d, joints, _): &&(FormulaDefinition, Vec<String>, &'static Law)| {
         d == definition && joints == robot.joint_names()
     };
     if let Some((.., law)) = made.iter().find(same) {
@@ -24,7 +24,7 @@ pub fn law(definition: &Definition, robot: &Robot) -> Result<&'static Law, Formu
             name: definition.name.clone(),
         });
     }
-    let formula = Formulas::of(definition, robot)?;
+    let formula = FormulaEffect::of(definition, robot)?;
     let law = leaked(definition, formula);
     made.push((definition.clone(), robot.joint_names().to_vec(), law));
     Ok(law)
@@ -34,7 +34,7 @@ fn text(text: &str) -> &'static str {
     Box::leak(text.to_owned().into_boxed_str())
 }
 
-fn leaked(definition: &Definition, formula: Formulas) -> &'static Law {
+fn leaked(definition: &FormulaDefinition, formula: FormulaEffect) -> &'static Law {
     let unit = |unit: &str| Unit::Fixed(text(unit));
     let shapes = definition.shapes.iter().map(|s| {
         let [least, most] = s.range;
@@ -58,8 +58,8 @@ fn leaked(definition: &Definition, formula: Formulas) -> &'static Law {
         families: &[Family::Own],
         keys: Box::leak(keys.into_boxed_slice()),
         search: match shape.is_empty() {
-            true => Search::Linear,
-            false => Search::Refined,
+            true => ShapeSearch::Linear,
+            false => ShapeSearch::Refined,
         },
         at_rest: definition.at_rest,
         friction: definition.friction,
@@ -81,7 +81,7 @@ fn leaked(definition: &Definition, formula: Formulas) -> &'static Law {
 
 impl Law {
     /// Shapes to begin the search from on these data, or what they lack.
-    pub fn starts_on(&self, cover: &Cover, place: Place) -> Starts {
+    pub fn starts_on(&self, cover: &LogCoverage, place: EffectPlace) -> ShapeStarts {
         match &self.formula {
             Some(formula) => Ok(formula.starts()),
             None => (self.starts)(cover, place),
@@ -89,7 +89,12 @@ impl Law {
     }
 
     /// Range of each shape parameter that is refined, the first of the shape, about a shape on these data.
-    pub fn limits_on(&self, cover: &Cover, place: Place, shape: &[f64]) -> Vec<ShapeSpan> {
+    pub fn limits_on(
+        &self,
+        cover: &LogCoverage,
+        place: EffectPlace,
+        shape: &[f64],
+    ) -> Vec<ShapeSpan> {
         match &self.formula {
             // the user's own ends: nothing is known of what lies beyond them
             Some(formula) => {
@@ -122,8 +127,8 @@ impl Law {
 
 #[cfg(test)]
 mod tests {
-    use super::super::formula::Shape;
-    use super::super::{Added, Scene};
+    use super::super::formula::FormulaShape;
+    use super::super::{EffectScene, ModelEffect};
     use super::*;
     use crate::motion::Stretch;
     use crate::robot::JointKind;
@@ -133,16 +138,16 @@ mod tests {
         Robot::single_joint("q1", JointKind::Revolute)
     }
 
-    fn definition(formula: &str) -> Definition {
-        Definition {
+    fn definition(formula: &str) -> FormulaDefinition {
+        FormulaDefinition {
             name: "own".into(),
             coefficients: vec![["c".into(), "Nm".into(), formula.into()]],
-            shapes: vec![Shape {
+            shapes: vec![FormulaShape {
                 name: "w".into(),
                 unit: "1".into(),
                 range: [1.0, 16.0],
             }],
-            ..Definition::default()
+            ..FormulaDefinition::default()
         }
     }
 
@@ -163,7 +168,7 @@ mod tests {
             ..Stretch::default()
         };
         let load = vec![vec![0.0; 20]];
-        let scene = Scene {
+        let scene = EffectScene {
             robot: &robot,
             theta: &[1.0],
             laws: &[JointFriction::None],
@@ -173,13 +178,13 @@ mod tests {
             direction: &[Vec::new()],
             tilt: None,
         };
-        let own = Added::new(law, Place::Joint(0), vec![3.0], vec![1.0]);
+        let own = ModelEffect::new(law, EffectPlace::Joint(0), vec![3.0], vec![1.0]);
         for (k, x) in own.columns(&scene, 0)[0].iter().enumerate() {
             let t = 0.1 * k as f64;
             let wanted = t.sin().cos() * (3.0 * t.cos()).tanh() + t.sin().powi(2) - t;
             assert!((x - wanted).abs() < 1e-12, "{k}: {x} {wanted}");
         }
-        let Ok(starts) = law.starts_on(&Cover::default(), Place::Joint(0)) else {
+        let Ok(starts) = law.starts_on(&LogCoverage::default(), EffectPlace::Joint(0)) else {
             panic!("a formula has shapes to begin from")
         };
         assert_eq!(starts.len(), 8);
@@ -207,13 +212,13 @@ mod tests {
             let error = law(&definition(formula), &robot()).unwrap_err().to_string();
             assert!(error.contains("own") && error.contains(says), "{error}");
         }
-        let named = Definition {
+        let named = FormulaDefinition {
             name: "spring".into(),
             ..definition("q")
         };
         let error = law(&named, &robot()).err().unwrap();
         assert!(matches!(error, FormulaError::Known { .. }));
-        let elsewhere = Definition {
+        let elsewhere = FormulaDefinition {
             joints: Some(vec!["q9".into()]),
             ..definition("q")
         };
@@ -235,7 +240,7 @@ mod tests {
             }
             let formula: String = formula.into_iter().collect();
             // what is read is not kept: a law would stay for good
-            let _ = Formulas::of(&definition(&formula), &robot);
+            let _ = FormulaEffect::of(&definition(&formula), &robot);
         }
     }
 }

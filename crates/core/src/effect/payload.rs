@@ -3,8 +3,8 @@
 //! turns. A fit whose logs carried it absorbs it: it is looked for only with the model kept.
 
 use super::{
-    EffectError, Entry, Family, Key, KeyValue, Law, Places, Reparametrisation, Role, Rule, Search,
-    Unit, Values,
+    EffectError, EffectReparametrisation, EffectValues, Entry, Family, Key, KeyValue, Law,
+    PlaceRule, Role, Rule, ShapeSearch, Unit,
 };
 use crate::robot::tree::MOST_JOINTS;
 
@@ -18,9 +18,9 @@ pub static ENTRY: Entry = Entry {
         Key::size("mz", Unit::Fixed("kg m")),
         Key::size("inertia", Unit::Fixed("kg m^2")),
     ],
-    places: Places::Whole,
+    places: PlaceRule::Whole,
     role: Role::Kept,
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[
         Rule::not_negative("mass", BODY),
         Rule::not_negative("inertia", BODY),
@@ -43,7 +43,7 @@ const BODY: &str = "a body has mass and inertia";
 pub static LAW: Law = Law {
     fits: |robot, _, _| robot.tool_stays_level(),
     // files have the inertia about the body's own centre; a point where nothing is said of its extent
-    reparametrised: Some(Reparametrisation {
+    reparametrised: Some(EffectReparametrisation {
         of_keys: |values| {
             let [mass, mx, my, mz] = body(values)?;
             let second = values.get_or("inertia", 0.0)? + (mx * mx + mz * mz) / mass;
@@ -84,7 +84,7 @@ pub static LAW: Law = Law {
 };
 
 /// Mass and first moments of a body in a file.
-pub(super) fn body(values: &Values) -> Result<[f64; 4], EffectError> {
+pub(super) fn body(values: &EffectValues) -> Result<[f64; 4], EffectError> {
     let mass = values.get("mass")?;
     if mass == 0.0 {
         return Err(values.unusable("mass", mass));

@@ -9,7 +9,7 @@ use crate::robot::model::JointFriction;
 /// One thing that must hold.
 #[derive(Debug, Clone, Copy)]
 pub struct Rule {
-    pub of: Number,
+    pub of: LimitedNumber,
     pub least: Limit,
     pub most: Limit,
     /// Why, in words: `a worn gear has up to 0.03 rad or 2 mm`.
@@ -18,7 +18,7 @@ pub struct Rule {
 
 /// A number of an effect that is looked at.
 #[derive(Debug, Clone, Copy)]
-pub enum Number {
+pub enum LimitedNumber {
     /// That of a key.
     Key(&'static str),
     /// Its size.
@@ -54,7 +54,7 @@ pub enum Limit {
 
 /// What limits refer to: a joint, what it did, and what is declared of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct LimitContext<'a> {
     pub cover: &'a JointCover,
     /// Longest log \[s\].
     pub duration_s: f64,
@@ -67,14 +67,14 @@ pub struct Seen<'a> {
 
 impl Rule {
     const USUAL: Rule = Rule {
-        of: Number::Weight,
+        of: LimitedNumber::Weight,
         least: Limit::None,
         most: Limit::None,
         why: "",
     };
 
     /// A number at most as large.
-    pub(crate) const fn at_most(of: Number, most: Limit, why: &'static str) -> Rule {
+    pub(crate) const fn at_most(of: LimitedNumber, most: Limit, why: &'static str) -> Rule {
         Rule {
             of,
             most,
@@ -84,7 +84,7 @@ impl Rule {
     }
 
     /// A number at least as large.
-    pub(crate) const fn at_least(of: Number, least: Limit, why: &'static str) -> Rule {
+    pub(crate) const fn at_least(of: LimitedNumber, least: Limit, why: &'static str) -> Rule {
         Rule {
             of,
             least,
@@ -95,11 +95,15 @@ impl Rule {
 
     /// A key that is not negative.
     pub(crate) const fn not_negative(key: &'static str, why: &'static str) -> Rule {
-        Rule::at_least(Number::Key(key), Limit::Is(0.0), why)
+        Rule::at_least(LimitedNumber::Key(key), Limit::Is(0.0), why)
     }
 
     /// What it says of an effect's keys, where they break it: the number in words and why it cannot be.
-    pub fn broken(&self, value: &dyn Fn(&str) -> Option<f64>, seen: &Seen) -> Option<String> {
+    pub fn broken(
+        &self,
+        value: &dyn Fn(&str) -> Option<f64>,
+        seen: &LimitContext,
+    ) -> Option<String> {
         let number = self.of.value(value, seen)?;
         let below = self.least.value(seen).filter(|least| number < *least);
         let above = self.most.value(seen).filter(|most| number > *most);
@@ -109,51 +113,51 @@ impl Rule {
             (None, None) => return None,
         };
         let name = match self.of {
-            Number::Key(name) => name.to_owned(),
-            Number::Size(name) => format!("|{name}|"),
-            Number::Ratio(a, b) => format!("{a}/{b}"),
-            Number::Amplitude(a, b) => format!("the amplitude of {a} and {b}"),
-            Number::AtTopSpeed(a, b) => format!("{a} + {b} |v| at top speed"),
-            Number::Weight => return Some(self.why.to_owned()),
+            LimitedNumber::Key(name) => name.to_owned(),
+            LimitedNumber::Size(name) => format!("|{name}|"),
+            LimitedNumber::Ratio(a, b) => format!("{a}/{b}"),
+            LimitedNumber::Amplitude(a, b) => format!("the amplitude of {a} and {b}"),
+            LimitedNumber::AtTopSpeed(a, b) => format!("{a} + {b} |v| at top speed"),
+            LimitedNumber::Weight => return Some(self.why.to_owned()),
         };
         Some(format!("{name} = {} {held}: {}", short(number), self.why))
     }
 
     /// The least that it allows.
-    pub(crate) fn least_of(&self, seen: &Seen) -> Option<f64> {
+    pub(crate) fn least_of(&self, seen: &LimitContext) -> Option<f64> {
         self.least.value(seen)
     }
 
     /// The most that it allows.
-    pub(crate) fn most_of(&self, seen: &Seen) -> Option<f64> {
+    pub(crate) fn most_of(&self, seen: &LimitContext) -> Option<f64> {
         self.most.value(seen)
     }
 
     /// The key that it looks at, where it is one.
     pub fn key(&self) -> Option<&'static str> {
         match self.of {
-            Number::Key(key) => Some(key),
+            LimitedNumber::Key(key) => Some(key),
             _ => None,
         }
     }
 }
 
-impl Number {
-    fn value(self, key: &dyn Fn(&str) -> Option<f64>, seen: &Seen) -> Option<f64> {
+impl LimitedNumber {
+    fn value(self, key: &dyn Fn(&str) -> Option<f64>, seen: &LimitContext) -> Option<f64> {
         match self {
-            Number::Key(name) => key(name),
-            Number::Size(name) => key(name).map(f64::abs),
-            Number::Ratio(a, b) => Some(key(a)? / key(b)?),
-            Number::Amplitude(a, b) => Some(key(a)?.hypot(key(b)?)),
-            Number::AtTopSpeed(a, b) => Some(key(a)? + seen.cover.fastest() * key(b)?),
-            Number::Weight => Some(f64::from(u8::from(seen.weight))),
+            LimitedNumber::Key(name) => key(name),
+            LimitedNumber::Size(name) => key(name).map(f64::abs),
+            LimitedNumber::Ratio(a, b) => Some(key(a)? / key(b)?),
+            LimitedNumber::Amplitude(a, b) => Some(key(a)?.hypot(key(b)?)),
+            LimitedNumber::AtTopSpeed(a, b) => Some(key(a)? + seen.cover.fastest() * key(b)?),
+            LimitedNumber::Weight => Some(f64::from(u8::from(seen.weight))),
         }
     }
 }
 
 impl Limit {
     /// In the unit of the number; none where there is none.
-    fn value(self, seen: &Seen) -> Option<f64> {
+    fn value(self, seen: &LimitContext) -> Option<f64> {
         match self {
             Limit::None => None,
             Limit::Is(x) => Some(x),
@@ -204,7 +208,7 @@ mod tests {
             viscous: 3.0,
             coulomb: 10.0,
         });
-        let seen = Seen {
+        let seen = LimitContext {
             cover: &cover,
             duration_s: 60.0,
             kind: JointKind::Revolute,
@@ -297,11 +301,11 @@ mod tests {
             let entry = law(&robot, name).unwrap().entry;
             for rule in entry.must {
                 let keys: &[&str] = match rule.of {
-                    Number::Key(a) | Number::Size(a) => &[a],
-                    Number::Ratio(a, b) | Number::Amplitude(a, b) | Number::AtTopSpeed(a, b) => {
-                        &[a, b]
-                    }
-                    Number::Weight => &[],
+                    LimitedNumber::Key(a) | LimitedNumber::Size(a) => &[a],
+                    LimitedNumber::Ratio(a, b)
+                    | LimitedNumber::Amplitude(a, b)
+                    | LimitedNumber::AtTopSpeed(a, b) => &[a, b],
+                    LimitedNumber::Weight => &[],
                 };
                 assert!(keys.iter().all(|key| entry.key(key).is_some()), "{name}");
             }

@@ -1,11 +1,11 @@
 //! Where effects sit: at joints, at the actuators of the CFT robot, between two joints, on the whole robot.
 
-use super::{EffectError, Values};
+use super::{EffectError, EffectValues};
 use crate::robot::{JointKind, Robot};
 
 /// What an effect acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Place {
+pub enum EffectPlace {
     /// One joint.
     Joint(usize),
     /// An actuator coordinate of the CFT robot: x_r (0) or y_r (1).
@@ -22,7 +22,7 @@ pub enum Place {
 
 /// Where an effect may sit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Places {
+pub enum PlaceRule {
     /// At a joint.
     Joints,
     /// At a joint, or on all of them together.
@@ -39,20 +39,22 @@ pub enum Places {
     Whole,
 }
 
-impl Place {
+impl EffectPlace {
     /// The joint, where it is one; none for actuator coordinates and for all joints.
     pub fn joint(self) -> Option<usize> {
         match self {
-            Place::Joint(j) | Place::Pair { on: j, .. } | Place::Geared { motor: j, .. } => Some(j),
-            Place::Actuator(_) | Place::Actuators | Place::All => None,
+            EffectPlace::Joint(j)
+            | EffectPlace::Pair { on: j, .. }
+            | EffectPlace::Geared { motor: j, .. } => Some(j),
+            EffectPlace::Actuator(_) | EffectPlace::Actuators | EffectPlace::All => None,
         }
     }
 
     /// The other joint, whose motion counts too.
     pub fn from(self) -> Option<usize> {
         match self {
-            Place::Pair { of, .. } => Some(of),
-            Place::Geared { other, .. } => Some(other),
+            EffectPlace::Pair { of, .. } => Some(of),
+            EffectPlace::Geared { other, .. } => Some(other),
             _ => None,
         }
     }
@@ -60,18 +62,18 @@ impl Place {
     /// Whether the effect adds torque to joint `j`.
     pub fn touches(self, j: usize) -> bool {
         match self {
-            Place::Joint(i) | Place::Pair { on: i, .. } => i == j,
-            Place::Geared { motor, other } => j == motor || j == other,
+            EffectPlace::Joint(i) | EffectPlace::Pair { on: i, .. } => i == j,
+            EffectPlace::Geared { motor, other } => j == motor || j == other,
             // the pantograph's references move q4 and q5
-            Place::Actuator(_) | Place::Actuators => j == 2 || j == 3,
-            Place::All => true,
+            EffectPlace::Actuator(_) | EffectPlace::Actuators => j == 2 || j == 3,
+            EffectPlace::All => true,
         }
     }
 
     /// Name in results and files: the joint's, `x_r` or `y_r`; none for all of them.
     pub fn name(self, robot: &Robot) -> Option<String> {
         match self {
-            Place::Actuator(row) => {
+            EffectPlace::Actuator(row) => {
                 let screws = robot.transmission().screws();
                 screws.get(row).map(|name| (*name).to_owned())
             }
@@ -82,8 +84,8 @@ impl Place {
     /// Rows of the pantograph's Jacobian that it has.
     pub(super) fn rows(self) -> std::ops::Range<usize> {
         match self {
-            Place::Actuator(row) => row..row + 1,
-            Place::Actuators => 0..2,
+            EffectPlace::Actuator(row) => row..row + 1,
+            EffectPlace::Actuators => 0..2,
             _ => 0..0,
         }
     }
@@ -91,7 +93,7 @@ impl Place {
     /// Whether the coordinate slides or turns.
     pub fn kind(self, robot: &Robot) -> JointKind {
         match self {
-            Place::Actuator(_) | Place::Actuators => JointKind::Prismatic,
+            EffectPlace::Actuator(_) | EffectPlace::Actuators => JointKind::Prismatic,
             _ => robot.joint_kind(self.joint().unwrap_or(0)),
         }
     }
@@ -99,7 +101,7 @@ impl Place {
     /// Its name in a sentence: `q1`, `x_r and y_r`, `all joints`.
     pub(super) fn words(self, robot: &Robot) -> String {
         match self {
-            Place::Actuators => robot.transmission().screws().join(" and "),
+            EffectPlace::Actuators => robot.transmission().screws().join(" and "),
             _ => self.name(robot).unwrap_or_else(|| "all joints".to_owned()),
         }
     }
@@ -108,33 +110,38 @@ impl Place {
     /// both turn one motor.
     pub fn keys(self) -> Vec<(&'static str, f64)> {
         match self {
-            Place::Pair { of, .. } => vec![("from", (of + 1) as f64)],
-            Place::Geared { other, .. } => vec![("from", (other + 1) as f64), ("both", 1.0)],
-            Place::Joint(_) | Place::Actuator(_) | Place::Actuators | Place::All => Vec::new(),
+            EffectPlace::Pair { of, .. } => vec![("from", (of + 1) as f64)],
+            EffectPlace::Geared { other, .. } => vec![("from", (other + 1) as f64), ("both", 1.0)],
+            EffectPlace::Joint(_)
+            | EffectPlace::Actuator(_)
+            | EffectPlace::Actuators
+            | EffectPlace::All => Vec::new(),
         }
     }
 }
 
-impl Places {
+impl PlaceRule {
     /// All of them on a robot.
-    pub fn on(self, robot: &Robot) -> Vec<Place> {
+    pub fn on(self, robot: &Robot) -> Vec<EffectPlace> {
         let n = robot.joints();
-        let joints = (0..n).map(Place::Joint);
+        let joints = (0..n).map(EffectPlace::Joint);
         let screws = robot.transmission().screws().len();
         // one number for several comes first: it is preferred to one for each
-        let together = (screws > 1).then_some(Place::Actuators);
-        let actuators = together.into_iter().chain((0..screws).map(Place::Actuator));
+        let together = (screws > 1).then_some(EffectPlace::Actuators);
+        let actuators = together
+            .into_iter()
+            .chain((0..screws).map(EffectPlace::Actuator));
         match self {
-            Places::Joints => joints.collect(),
-            Places::JointsOrAll => {
-                let all = (n > 1).then_some(Place::All);
+            PlaceRule::Joints => joints.collect(),
+            PlaceRule::JointsOrAll => {
+                let all = (n > 1).then_some(EffectPlace::All);
                 all.into_iter().chain(joints).collect()
             }
-            Places::Pairs => pairs(robot),
-            Places::Others => directed(n).collect(),
-            Places::Actuators => actuators.collect(),
-            Places::JointsAndActuators => joints.chain(actuators).collect(),
-            Places::Whole => vec![Place::All],
+            PlaceRule::Pairs => pairs(robot),
+            PlaceRule::Others => directed(n).collect(),
+            PlaceRule::Actuators => actuators.collect(),
+            PlaceRule::JointsAndActuators => joints.chain(actuators).collect(),
+            PlaceRule::Whole => vec![EffectPlace::All],
         }
     }
 
@@ -147,20 +154,21 @@ impl Places {
         self,
         robot: &Robot,
         joint: Option<&str>,
-        values: &Values,
-    ) -> Result<Place, EffectError> {
+        values: &EffectValues,
+    ) -> Result<EffectPlace, EffectError> {
         let nowhere = || EffectError::Place {
             name: values.effect.to_owned(),
         };
         let Some(joint) = joint else {
             return match self {
-                Places::JointsOrAll | Places::Whole => Ok(Place::All),
-                _ if self.on(robot).contains(&Place::Actuators) => Ok(Place::Actuators),
+                PlaceRule::JointsOrAll | PlaceRule::Whole => Ok(EffectPlace::All),
+                _ if self.on(robot).contains(&EffectPlace::Actuators) => Ok(EffectPlace::Actuators),
                 _ => Err(nowhere()),
             };
         };
-        let of_name = |place: &Place| place.name(robot).as_deref() == Some(joint);
-        let actuator = |place: &Place| matches!(place, Place::Actuator(_)) && of_name(place);
+        let of_name = |place: &EffectPlace| place.name(robot).as_deref() == Some(joint);
+        let actuator =
+            |place: &EffectPlace| matches!(place, EffectPlace::Actuator(_)) && of_name(place);
         if let Some(place) = self.on(robot).into_iter().find(actuator) {
             return Ok(place);
         }
@@ -172,34 +180,34 @@ impl Places {
             known: names.join(", "),
         })?;
         match self {
-            Places::Pairs | Places::Others => pair(on, names.len(), values),
-            Places::Actuators | Places::Whole => Err(nowhere()),
-            _ => Ok(Place::Joint(on)),
+            PlaceRule::Pairs | PlaceRule::Others => pair(on, names.len(), values),
+            PlaceRule::Actuators | PlaceRule::Whole => Err(nowhere()),
+            _ => Ok(EffectPlace::Joint(on)),
         }
     }
 }
 
 /// Every two joints: geared ones, then each that follows another.
-fn pairs(robot: &Robot) -> Vec<Place> {
+fn pairs(robot: &Robot) -> Vec<EffectPlace> {
     let n = robot.joints();
     // the motor is the one further out: its train passes through the joint before it
     let geared = (0..n).flat_map(|motor| (0..motor).map(move |o| (motor, o)));
     // of joints of two kinds the numbers would have two units
     let alike = |(a, b): &(usize, usize)| robot.joint_kind(*a) == robot.joint_kind(*b);
     let geared = geared.filter(alike);
-    let geared = geared.map(|(motor, other)| Place::Geared { motor, other });
+    let geared = geared.map(|(motor, other)| EffectPlace::Geared { motor, other });
     geared.chain(directed(n)).collect()
 }
 
 /// Each joint with each other that has a part in it.
-fn directed(n: usize) -> impl Iterator<Item = Place> {
+fn directed(n: usize) -> impl Iterator<Item = EffectPlace> {
     let pairs = (0..n).flat_map(move |on| (0..n).map(move |of| (on, of)));
     let pairs = pairs.filter(|(on, of)| on != of);
-    pairs.map(|(on, of)| Place::Pair { on, of })
+    pairs.map(|(on, of)| EffectPlace::Pair { on, of })
 }
 
 /// Joint `on` with the one that the key `from` numbers.
-fn pair(on: usize, joints: usize, values: &Values) -> Result<Place, EffectError> {
+fn pair(on: usize, joints: usize, values: &EffectValues) -> Result<EffectPlace, EffectError> {
     let from = values.get("from")?;
     let at = from as usize;
     if from.fract() != 0.0 || at < 1 || at > joints || at - 1 == on {
@@ -208,7 +216,7 @@ fn pair(on: usize, joints: usize, values: &Values) -> Result<Place, EffectError>
     let other = at - 1;
     let both = values.get("both").is_ok_and(|both| both != 0.0);
     Ok(match both {
-        true => Place::Geared { motor: on, other },
-        false => Place::Pair { on, of: other },
+        true => EffectPlace::Geared { motor: on, other },
+        false => EffectPlace::Pair { on, of: other },
     })
 }

@@ -4,7 +4,8 @@
 
 use super::order::wavenumber;
 use super::{
-    Entry, Family, Key, Ladder, Law, Limit, Number, Place, Places, Rule, Search, Unit, exact,
+    EffectPlace, Entry, Family, Key, Law, Limit, LimitedNumber, PlaceRule, Rule, ShapeSearch,
+    SpeedLadder, Unit, exact,
 };
 
 pub static ENTRY: Entry = Entry {
@@ -16,14 +17,14 @@ pub static ENTRY: Entry = Entry {
         Key::torque("sin"),
         Key::torque("cos"),
     ],
-    places: Places::Others,
-    search: Search::Grid,
+    places: PlaceRule::Others,
+    search: ShapeSearch::Grid,
     must: &[Rule::at_most(
-        Number::Amplitude("sin", "cos"),
+        LimitedNumber::Amplitude("sin", "cos"),
         Limit::Coulomb(1.0),
         "with more than the joint's Coulomb friction it would drive the joint",
     )],
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     friction: true,
     separate_by: "move this joint alone, both ways, at several poses of the other one",
     formula: "sgn(v_i) (sin sin(order q_j) + cos cos(order q_j)) of joint j = from, counted from 1",
@@ -51,7 +52,7 @@ pub static LAW: Law = Law {
         Ok([1.0, 2.0].map(|order| vec![order]).to_vec())
     },
     code: Some(|to| {
-        let Place::Pair { of, .. } = to.place else {
+        let EffectPlace::Pair { of, .. } = to.place else {
             return;
         };
         let wave = exact(wavenumber(&to.model.robot, of, to.shape[0]));
@@ -60,7 +61,7 @@ pub static LAW: Law = Law {
         to.added(format!("{} * ({wave})", to.direction()));
     }),
     ..Law::linear(&ENTRY, &["sin", "cos"], |at, _, out| {
-        let Place::Pair { of, .. } = at.place else {
+        let EffectPlace::Pair { of, .. } = at.place else {
             return;
         };
         let wave = wavenumber(at.scene.robot, of, at.shape[0]);

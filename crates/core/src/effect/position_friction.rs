@@ -3,7 +3,10 @@
 //! rest, so is the sign.
 
 use super::order::{order_limits, orders};
-use super::{CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, Unit};
+use super::{
+    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, SpeedLadder,
+    Unit,
+};
 
 pub static ENTRY: Entry = Entry {
     name: "position-friction",
@@ -13,14 +16,14 @@ pub static ENTRY: Entry = Entry {
         Key::torque("sin"),
         Key::torque("cos"),
     ],
-    search: Search::Orders,
+    search: ShapeSearch::Orders,
     must: &[Rule::at_most(
-        Number::Amplitude("sin", "cos"),
+        LimitedNumber::Amplitude("sin", "cos"),
         Limit::Coulomb(1.0),
         "with more than the joint's Coulomb friction it would drive the joint",
     )],
     otherwise: Some(CurveSignal::Friction),
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     friction: true,
     separate_by: "log the same stretch of travel in both directions at one speed",
     formula: "sgn(v) (sin sin(order q) + cos cos(order q))",

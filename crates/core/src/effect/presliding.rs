@@ -4,8 +4,8 @@
 //! sigma0 = fc rate.
 
 use super::{
-    CurveSignal, Entry, Family, Key, KeyValue, Ladder, Law, Limit, Number, Reparametrisation, Rule,
-    Search, ShapeSpan, Unit,
+    CurveSignal, EffectReparametrisation, Entry, Family, Key, KeyValue, Law, Limit, LimitedNumber,
+    Rule, ShapeSearch, ShapeSpan, SpeedLadder, Unit,
 };
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
@@ -23,19 +23,19 @@ pub static ENTRY: Entry = Entry {
         ),
         Key::shape("fc", Unit::Torque),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[
         Rule::not_negative("sigma0", BRISTLES),
         Rule::not_negative("fc", BRISTLES),
         Rule::not_negative("sigma1", BRISTLES),
         Rule::at_most(
-            Number::Ratio("fc", "sigma0"),
+            LimitedNumber::Ratio("fc", "sigma0"),
             Limit::Presliding,
             "rolling contacts and seals slip after 0.05 rad or 5 mm, or what [drive] declares",
         ),
     ],
     otherwise: Some(CurveSignal::Way),
-    ladder: Some(Ladder::NARROW),
+    ladder: Some(SpeedLadder::NARROW),
     separate_by: "log slow reversals at several amplitudes below and above breakaway",
     formula: "sigma0 z + sigma1 dz/dt for F - viscous v; dz/dt = v - sigma0 abs(v) z/fc",
     source: "bristles that bend before they slip (Dahl 1968; Canudas de Wit et al. 1995)",
@@ -65,7 +65,7 @@ pub static LAW: Law = Law {
         vec![ShapeSpan::of(3.0 / range, 1e4 / range)]
     },
     // sigma0 = fc rate
-    reparametrised: Some(Reparametrisation {
+    reparametrised: Some(EffectReparametrisation {
         of_keys: |values| {
             let (sigma0, fc) = (values.get("sigma0")?, values.get("fc")?);
             let rate = sigma0 / fc;
@@ -129,11 +129,12 @@ fn saturating(law: &JointFriction, v: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::LAW;
-    use crate::effect::{Added, Place};
+    use crate::effect::{EffectPlace, ModelEffect};
 
     #[test]
     fn bristles_that_carry_nothing_cannot_be() {
-        let of = |fc| Added::new(&LAW, Place::Joint(0), vec![50.0], vec![fc, 0.3]).can_be();
+        let of =
+            |fc| ModelEffect::new(&LAW, EffectPlace::Joint(0), vec![50.0], vec![fc, 0.3]).can_be();
         assert!(of(1.0) && !of(0.0));
     }
 }

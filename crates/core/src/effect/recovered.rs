@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Added, LAWS, Law, Place, Scene};
+use super::{EffectPlace, EffectScene, LAWS, Law, ModelEffect};
 use crate::motion::Stretch;
 use crate::robot::double_pendulum::double_pendulum;
 use crate::robot::friction::ViscousCoulomb;
@@ -19,7 +19,7 @@ const FRICTION: ViscousCoulomb = ViscousCoulomb {
 };
 
 /// One joint of two, whose motions are sums of waves of other periods.
-struct Bench {
+struct TwoJointBench {
     robot: Robot,
     stretch: Stretch,
     load: Vec<Vec<f64>>,
@@ -37,7 +37,7 @@ fn motion(waves: &[[f64; 2]]) -> [Vec<f64>; 3] {
     [0, 1, 2].map(|i| rows.iter().map(|row| row[i]).collect())
 }
 
-impl Bench {
+impl TwoJointBench {
     fn new() -> Self {
         let own = motion(&[[0.5, 1.7], [0.2, 4.1], [0.05, 9.3]]);
         let other = motion(&[[0.6, 1.1], [0.15, 5.3]]);
@@ -63,11 +63,16 @@ impl Bench {
     }
 
     /// Coefficients of a law in a shape, where `added` is what it adds at each sample; and the part of the squares left.
-    fn found(&self, (name, place): (&str, Place), shape: &[f64], added: &[f64]) -> (Vec<f64>, f64) {
+    fn found(
+        &self,
+        (name, place): (&str, EffectPlace),
+        shape: &[f64],
+        added: &[f64],
+    ) -> (Vec<f64>, f64) {
         let law: &'static Law = LAWS.iter().find(|law| law.entry.name == name).unwrap();
         let laws = [JointFriction::ViscousCoulomb(FRICTION); 2];
         let nothing = vec![Vec::new(); 2];
-        let scene = Scene {
+        let scene = EffectScene {
             robot: &self.robot,
             theta: &[INERTIA],
             laws: &laws,
@@ -77,7 +82,7 @@ impl Bench {
             direction: &nothing,
             tilt: None,
         };
-        let effect = Added::new(law, place, shape.to_vec(), vec![1.0; law.linear.len()]);
+        let effect = ModelEffect::new(law, place, shape.to_vec(), vec![1.0; law.linear.len()]);
         let mut columns = effect.columns(&scene, 0);
         let own = columns.len();
         let v = &self.stretch.v[0];
@@ -105,8 +110,8 @@ impl Bench {
     }
 }
 
-const ALONE: Place = Place::Joint(0);
-const WITH: Place = Place::Pair { on: 0, of: 1 };
+const ALONE: EffectPlace = EffectPlace::Joint(0);
+const WITH: EffectPlace = EffectPlace::Pair { on: 0, of: 1 };
 
 fn assert_near(found: &[f64], wanted: &[f64], by: f64) {
     for (k, (x, wanted)) in found.iter().zip(wanted).enumerate() {
@@ -116,7 +121,7 @@ fn assert_near(found: &[f64], wanted: &[f64], by: f64) {
 
 #[test]
 fn each_of_the_frictions_of_a_coupling_is_told_from_the_other() {
-    let b = Bench::new();
+    let b = TwoJointBench::new();
     let (v, w, a) = (&b.stretch.v[0], &b.stretch.v[1], &b.stretch.a[1]);
     for (planted, r) in [([0.4, 0.0, 0.1, 1.5], 1.0), ([0.2, 0.9, 0.0, 0.3], -1.0)] {
         let [viscous, coulomb, inertia, from] = planted;
@@ -131,7 +136,7 @@ fn each_of_the_frictions_of_a_coupling_is_told_from_the_other() {
 
 #[test]
 fn drifts_and_gains_that_settle_are_told_by_their_time() {
-    let b = Bench::new();
+    let b = TwoJointBench::new();
     let settled = |k: usize| 1.0 - (-DT * k as f64 / 6.0).exp();
     let drift = b.each(|k| 0.3 * settled(k));
     assert_near(
@@ -151,7 +156,7 @@ fn drifts_and_gains_that_settle_are_told_by_their_time() {
 
 #[test]
 fn a_gain_that_falls_with_the_current_is_told_from_one_that_falls_over_time() {
-    let b = Bench::new();
+    let b = TwoJointBench::new();
     // a motor that gives less in proportion to what it gives: at its peak a tenth
     let acting = &b.hat[0];
     let peak = acting.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
@@ -168,7 +173,7 @@ fn a_gain_that_falls_with_the_current_is_told_from_one_that_falls_over_time() {
 
 #[test]
 fn ripple_in_proportion_to_the_torque_is_told_from_ripple_that_is_not() {
-    let b = Bench::new();
+    let b = TwoJointBench::new();
     let q = &b.stretch.q[0];
     let torque = b.each(|k| b.hat[0][k] * 0.07 * (13.0 * q[k] + 0.6).sin());
     let wanted = [0.07 * 0.6_f64.cos(), 0.07 * 0.6_f64.sin()];
@@ -182,7 +187,7 @@ fn ripple_in_proportion_to_the_torque_is_told_from_ripple_that_is_not() {
 
 #[test]
 fn friction_by_the_pose_of_another_joint_is_told_from_that_along_its_own_way() {
-    let b = Bench::new();
+    let b = TwoJointBench::new();
     let (v, other) = (&b.stretch.v[0], &b.stretch.q[1]);
     let torque = b.each(|k| 0.2 * v[k].signum() * (other[k] - 0.5).cos());
     let wanted = [0.2 * 0.5_f64.sin(), 0.2 * 0.5_f64.cos()];
@@ -196,7 +201,7 @@ fn friction_by_the_pose_of_another_joint_is_told_from_that_along_its_own_way() {
 
 #[test]
 fn a_load_that_flies_across_its_play_is_found_with_its_inertia_and_the_width() {
-    let b = Bench::new();
+    let b = TwoJointBench::new();
     let (q, v) = (&b.stretch.q[0], &b.stretch.v[0]);
     let (load, gap) = (0.02, 0.02);
     // by steps of a hundredth of a row: a load between two stiff, damped ends, integrated on its own
@@ -252,7 +257,7 @@ fn a_load_that_flies_across_its_play_is_found_with_its_inertia_and_the_width() {
         tau: one(&b.stretch.tau),
         ..Stretch::default()
     };
-    let scene = Scene {
+    let scene = EffectScene {
         robot: &robot,
         theta: &[INERTIA],
         laws: &laws,
@@ -264,7 +269,7 @@ fn a_load_that_flies_across_its_play_is_found_with_its_inertia_and_the_width() {
     };
     let wanted = smooth(&torque);
     let left = |gap: f64| {
-        let effect = Added::new(law, ALONE, vec![gap], vec![1.0]);
+        let effect = ModelEffect::new(law, ALONE, vec![gap], vec![1.0]);
         let column = smooth(&effect.columns(&scene, 0)[0]);
         let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
         let inertia = dot(&column, &wanted) / dot(&column, &column);

@@ -1,7 +1,7 @@
 //! `rigid-body-terms`: the base parameters of the full chain that the declared structure drops: for
 //! the CFT robot with 12 parameters the other ten of its 22.
 
-use super::{Entry, Family, Key, Law, Places, Unit};
+use super::{Entry, Family, Key, Law, PlaceRule, Unit};
 use crate::robot::cft::UNPRINTED;
 
 /// The parameters of the full chain that the report does not print.
@@ -19,7 +19,7 @@ pub static ENTRY: Entry = Entry {
     name: "rigid-body-terms",
     families: &[Family::Inertia],
     keys: &KEYS,
-    places: Places::Whole,
+    places: PlaceRule::Whole,
     separate_by: "declare `parameters = 22` and excite all joints together, fast",
     formula: "the ten columns that the twelve parameters leave out",
     source: "links that are no thin rods, by the full chain of the report",

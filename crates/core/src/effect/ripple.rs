@@ -2,7 +2,7 @@
 //! effect of its own order.
 
 use super::order::{order_limits, orders};
-use super::{Entry, Family, Key, Ladder, Law, Search, Unit};
+use super::{Entry, Family, Key, Law, ShapeSearch, SpeedLadder, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "ripple",
@@ -16,8 +16,8 @@ pub static ENTRY: Entry = Entry {
         Key::torque("sin3"),
         Key::torque("cos3"),
     ],
-    search: Search::Orders,
-    ladder: Some(Ladder::USUAL),
+    search: ShapeSearch::Orders,
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "log the same stretch of travel at two constant speeds (the order stays, the \
                   frequency moves)",
     formula: "sin sin(order q) + cos cos(order q), and harmonics 2 and 3",

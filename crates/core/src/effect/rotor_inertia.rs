@@ -2,16 +2,18 @@
 //! actuator coordinates x_r and y_r the screws move with the pantograph's Jacobian:
 //! tau = J' m (J a + Jdot v).
 
-use super::{Entry, Family, Key, Ladder, Law, Place, Places, Property, Rule, Unit};
+use super::{
+    EffectPlace, Entry, Family, Key, Law, PlaceRule, RobotProperty, Rule, SpeedLadder, Unit,
+};
 use crate::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
 
 pub static ENTRY: Entry = Entry {
     name: "rotor-inertia",
     families: &[Family::Inertia],
     keys: &[Key::size("J", Unit::Inertia)],
-    places: Places::JointsAndActuators,
+    places: PlaceRule::JointsAndActuators,
     must: &[Rule::not_negative("J", "a rotor has mass")],
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "log fast reversals of one actuator at several poses of the arm",
     formula: "J a; at a screw J_a' J (J_a a + dJ_a/dt v)",
     source: "a rotor or screw that the links' inertias do not hold",
@@ -23,7 +25,7 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     code: Some(|to| match to.place {
-        Place::Actuator(_) | Place::Actuators => {
+        EffectPlace::Actuator(_) | EffectPlace::Actuators => {
             let inertia = to.x(0);
             to.of_screws(|_, acceleration| format!("{inertia} * {acceleration}"));
         }
@@ -31,11 +33,11 @@ pub static LAW: Law = Law {
     }),
     property: |place, _, linear| {
         let inertia = linear[0];
-        let of = |joint| Property::Drive { joint, inertia };
+        let of = |joint| RobotProperty::Drive { joint, inertia };
         place.joint().map(of)
     },
     ..Law::linear(&ENTRY, &["J"], |at, _, out| match at.place {
-        Place::Joint(_) => out[0] = at.a(),
+        EffectPlace::Joint(_) => out[0] = at.a(),
         place => {
             let [q, v, a] = at.state();
             let (jacobian, rate) = (reference_jacobian(&q), reference_jacobian_rate(&q, &v));

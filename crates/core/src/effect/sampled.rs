@@ -1,11 +1,11 @@
 //! A model with effects one sample after the other, as rows arrive.
 
-use super::{AugmentedModel, Role, Scene};
+use super::{AugmentedModel, EffectScene, Role};
 use crate::motion::Stretch;
 
 /// A model, and what its effects keep from sample to sample.
 #[derive(Debug, Clone)]
-pub struct Sampled {
+pub struct SampledModel {
     model: AugmentedModel,
     /// Of one sample.
     stretch: Stretch,
@@ -18,7 +18,7 @@ pub struct Sampled {
     out: Vec<f64>,
 }
 
-impl Sampled {
+impl SampledModel {
     /// For samples `dt` seconds apart.
     pub fn new(model: AugmentedModel, dt: f64) -> Self {
         let n = model.model.robot.joints();
@@ -83,7 +83,7 @@ impl Sampled {
         for (j, direction) in self.direction.iter_mut().enumerate() {
             *direction = self.model.direction(&self.stretch, j);
         }
-        let scene = Scene {
+        let scene = EffectScene {
             robot: &model.robot,
             theta: &model.theta,
             laws: &model.friction,
@@ -117,32 +117,32 @@ impl Sampled {
 mod tests {
     use super::*;
     use crate::effect;
-    use crate::effect::Added;
-    use crate::effect::formula::{Definition, Shape};
+    use crate::effect::ModelEffect;
+    use crate::effect::formula::{FormulaDefinition, FormulaShape};
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
     use crate::robot::{JointKind, Robot};
 
     /// A formula of the user's own in all that hangs on the way before.
-    fn remembers(robot: &Robot) -> Added {
+    fn remembers(robot: &Robot) -> ModelEffect {
         let of = |name: &str, unit: &str, text: &str| [name, unit, text].map(str::to_owned);
-        let scale = |name: &str| Shape {
+        let scale = |name: &str| FormulaShape {
             name: name.to_owned(),
             unit: "rad".to_owned(),
             range: [0.001, 1.0],
         };
-        let definition = Definition {
+        let definition = FormulaDefinition {
             name: "remembers".to_owned(),
             coefficients: vec![
                 of("c1", "Nm", "play * abs(q) + exp(-since_reversal / 0.1)"),
                 of("c2", "Nm", "dahl - play"),
             ],
             shapes: vec![scale("way"), scale("width")],
-            ..Definition::default()
+            ..FormulaDefinition::default()
         };
         let law = effect::own::law(&definition, robot).unwrap();
-        let place = effect::Place::Joint(0);
-        Added::new(law, place, vec![0.05, 0.1], vec![0.3, 0.2])
+        let place = effect::EffectPlace::Joint(0);
+        ModelEffect::new(law, place, vec![0.05, 0.1], vec![0.3, 0.2])
     }
 
     #[test]
@@ -191,7 +191,7 @@ mod tests {
             ..Stretch::default()
         };
         let whole = model.torques(&stretch).hat;
-        let mut sampled = Sampled::new(model, dt);
+        let mut sampled = SampledModel::new(model, dt);
         sampled.begin();
         let mut tau = [0.0];
         for k in 0..stretch.len() {

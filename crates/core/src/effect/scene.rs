@@ -2,13 +2,13 @@
 
 use std::sync::OnceLock;
 
-use super::Place;
+use super::EffectPlace;
 use crate::motion::Stretch;
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
 /// Along one stretch: the motion, and what the model as it stands makes of it.
-pub struct Scene<'a> {
+pub struct EffectScene<'a> {
     pub robot: &'a Robot,
     pub theta: &'a [f64],
     pub laws: &'a [JointFriction],
@@ -28,7 +28,7 @@ pub struct Scene<'a> {
 /// \[N or N m per m/s^2\].
 pub type TiltTorques = OnceLock<[Vec<Vec<f64>>; 2]>;
 
-impl Scene<'_> {
+impl EffectScene<'_> {
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.stretch.len()
@@ -51,8 +51,8 @@ impl Scene<'_> {
 /// One sample of a scene, as the law of an effect at a place sees it.
 #[derive(Clone, Copy)]
 pub(super) struct Instant<'a> {
-    pub scene: &'a Scene<'a>,
-    pub place: Place,
+    pub scene: &'a EffectScene<'a>,
+    pub place: EffectPlace,
     pub shape: &'a [f64],
     /// The joint whose row is filled; that of the place where it is one joint.
     pub joint: usize,

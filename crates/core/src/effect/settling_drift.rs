@@ -1,7 +1,7 @@
 //! `settling-drift`: a torque that drifts from the begin of a log and settles, level (1 - exp(-t/T)), in both directions.
 //! A drift that goes on over the log is `drift`, with one number less.
 
-use super::{Entry, Family, Key, Law, Search, ShapeSpan, Unit};
+use super::{Entry, Family, Key, Law, ShapeSearch, ShapeSpan, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "settling-drift",
@@ -10,7 +10,7 @@ pub static ENTRY: Entry = Entry {
         Key::torque("level"),
         Key::shape("T", Unit::Fixed("s")).above_zero("must be above 0 s"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     separate_by: "hold the joint still at one pose from the start of a log until the torque stands",
     formula: "level (1 - exp(-t/T))",
     source: "a torque sensor or an amplifier that warms up and stays warm",

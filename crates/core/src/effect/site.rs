@@ -1,6 +1,6 @@
 //! Where an effect writes itself into generated code: its numbers as text, and the lists that take its statements.
 
-use super::Place;
+use super::EffectPlace;
 use super::law_text::{exact, law};
 use crate::robot::cft::geometry::L4;
 use crate::robot::model::{JointFriction, Model};
@@ -8,7 +8,7 @@ use crate::robot::standard::{Body, STANDARD};
 
 /// What a model remembers from sample to sample.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Remembered {
+pub struct StateVariable {
     /// Name of the field.
     pub name: String,
     /// Numbers in it; one that is not in a list for `None`.
@@ -27,7 +27,7 @@ pub struct EffectsCode {
     pub of_friction: Vec<usize>,
     /// After load and friction: other functions of q, v, a and load.
     pub added: Vec<String>,
-    pub memory: Vec<Remembered>,
+    pub memory: Vec<StateVariable>,
     /// In a step, after all that remembers nothing.
     pub steps: Vec<String>,
     /// Joints whose memory takes its inertia from a pose, with the field.
@@ -46,7 +46,7 @@ pub struct EffectsCode {
 
 /// An effect that is a property of links, drives or the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Property {
+pub enum RobotProperty {
     /// Inertia of the drive of a joint \[kg or kg m^2\].
     Drive { joint: usize, inertia: f64 },
     /// Gravity along the base's x and y \[m/s^2\].
@@ -60,7 +60,7 @@ pub(super) struct CodeSite<'a> {
     pub(super) out: &'a mut EffectsCode,
     /// The place of the effect among those of the model: its own names end with it.
     pub(super) number: usize,
-    pub(super) place: Place,
+    pub(super) place: EffectPlace,
     pub(super) shape: &'a [f64],
     pub(super) linear: &'a [f64],
     /// Name and place.
@@ -160,7 +160,7 @@ impl CodeSite<'_> {
     pub fn remember(&mut self, name: &str, size: Option<usize>, first: &str, by: &str) -> String {
         let name = format!("{name}_{}", self.number);
         let own = format!("state.{name}");
-        self.out.memory.push(Remembered {
+        self.out.memory.push(StateVariable {
             name,
             size,
             first: first.to_owned(),

@@ -3,8 +3,8 @@
 
 use crate::math::hyperbolic::tanh;
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit,
-    jumps_or_is_none,
+    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan,
+    SpeedLadder, Unit, jumps_or_is_none,
 };
 use crate::robot::friction::sign;
 
@@ -15,18 +15,18 @@ pub static ENTRY: Entry = Entry {
         Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
         Key::torque("fc"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     friction: true,
     must: &[
         Rule::not_negative("fc", "friction acts against the motion"),
         Rule::at_most(
-            Number::Key("vs"),
+            LimitedNumber::Key("vs"),
             Limit::TopSpeed(0.3),
             "Coulomb friction is reached well below the top speed",
         ),
     ],
     otherwise: Some(CurveSignal::Speed),
-    ladder: Some(Ladder::NARROW),
+    ladder: Some(SpeedLadder::NARROW),
     separate_by: "log slow reversals at several amplitudes (friction that depends on speed stays the \
                   same, a presliding loop shrinks with the amplitude)",
     formula: "fc tanh(v/vs) for F - viscous v",

@@ -1,6 +1,6 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3.
 
-use super::{Entry, Family, Key, Ladder, Law, Rule, Search, ShapeSpan, Unit};
+use super::{Entry, Family, Key, Law, Rule, ShapeSearch, ShapeSpan, SpeedLadder, Unit};
 
 pub static ENTRY: Entry = Entry {
     name: "spring",
@@ -10,12 +10,12 @@ pub static ENTRY: Entry = Entry {
         Key::shape("q0", Unit::Position),
         Key::size("k3", Unit::Cubic),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[Rule::not_negative(
         "k",
         "a spring pulls back; a torque that falls with the position is a weight",
     )],
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "log a slow sweep over the whole travel with two payloads (gravity scales, a spring \
                   does not)",
     formula: "k (q - q0) + k3 (q - q0)^3",

@@ -2,8 +2,8 @@
 //! Dupont and Canudas de Wit 1994), where the declared law has no such term.
 
 use super::{
-    CurveSignal, Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit,
-    jumps_or_is_none,
+    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan,
+    SpeedLadder, Unit, jumps_or_is_none,
 };
 use crate::robot::friction::sign;
 
@@ -14,20 +14,20 @@ pub static ENTRY: Entry = Entry {
         Key::torque("c"),
         Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[
         Rule::not_negative(
             "c",
             "Stribeck friction is higher at low speed; friction that is lower there does not jump at rest",
         ),
         Rule::at_most(
-            Number::Key("vs"),
+            LimitedNumber::Key("vs"),
             Limit::TopSpeed(0.3),
             "a lubricant film builds up at low speed, below 0.3 of the top speed",
         ),
     ],
     otherwise: Some(CurveSignal::Speed),
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     friction: true,
     separate_by: "log slow constant speeds, both ways, from a hundredth of the top speed up",
     formula: "c sgn(v) exp(-(v/vs)^2)",

@@ -1,12 +1,12 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::{Entry, Family, Key, Ladder, Law};
+use super::{Entry, Family, Key, Law, SpeedLadder};
 
 pub static ENTRY: Entry = Entry {
     name: "torque-offset",
     families: &[Family::Offset],
     keys: &[Key::torque("c")],
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "hold the joint still at several poses under brake-free control, then move it \
                   both ways at three or more constant speeds",
     formula: "c",

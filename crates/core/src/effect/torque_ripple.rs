@@ -3,7 +3,7 @@
 //! current, is `ripple`.
 
 use super::order::{order_limits, orders};
-use super::{Entry, Family, Key, Ladder, Law, Search, Unit};
+use super::{Entry, Family, Key, Law, ShapeSearch, SpeedLadder, Unit};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -14,8 +14,8 @@ pub static ENTRY: Entry = Entry {
         Key::size("sin", Unit::One),
         Key::size("cos", Unit::One),
     ],
-    search: Search::Orders,
-    ladder: Some(Ladder::USUAL),
+    search: ShapeSearch::Orders,
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "log the same stretch of travel with two payloads (it grows with the torque, cogging does not)",
     formula: "(sin sin(order q) + cos cos(order q)) times the acting torque",
     source: "currents that are no pure sines, or a current sensor that is off in one phase (Jahns and Soong 1996)",

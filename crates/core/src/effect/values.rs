@@ -34,7 +34,7 @@ pub enum EffectError {
 
 /// What a file gives for the keys of an effect.
 #[derive(Debug, Clone, Copy)]
-pub struct Values<'a> {
+pub struct EffectValues<'a> {
     /// The effect's name.
     pub effect: &'a str,
     /// The keys that it takes, as errors list them.
@@ -42,7 +42,7 @@ pub struct Values<'a> {
     pub given: &'a BTreeMap<String, f64>,
 }
 
-impl Values<'_> {
+impl EffectValues<'_> {
     /// The number of a key.
     ///
     /// # Errors

@@ -1,6 +1,8 @@
 //! `warm-up`: friction times 1 + k (1 - exp(-t/T)), t since the begin of the log.
 
-use super::{Entry, Family, Key, Ladder, Law, Limit, Number, Rule, Search, ShapeSpan, Unit};
+use super::{
+    Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan, SpeedLadder, Unit,
+};
 use crate::number;
 
 pub static ENTRY: Entry = Entry {
@@ -14,25 +16,25 @@ pub static ENTRY: Entry = Entry {
         ),
         Key::shape("T", Unit::Fixed("s")).above_zero("must be above 0 s"),
     ],
-    search: Search::Refined,
+    search: ShapeSearch::Refined,
     must: &[
         Rule::at_least(
-            Number::Key("T"),
+            LimitedNumber::Key("T"),
             Limit::Is(5.0),
             "no grease warms up within 5 s",
         ),
         Rule::at_most(
-            Number::Key("T"),
+            LimitedNumber::Key("T"),
             Limit::Duration(3.0),
             "a log shows no warm-up that takes three times as long as itself: that is a drift",
         ),
         Rule::at_least(
-            Number::Key("k"),
+            LimitedNumber::Key("k"),
             Limit::Is(-1.0),
             "friction would drive the joint",
         ),
     ],
-    ladder: Some(Ladder::LONG),
+    ladder: Some(SpeedLadder::LONG),
     friction: true,
     separate_by: "log the same segment of motion at the start and at the end of an hour",
     formula: "F(v) k (1 - exp(-t/T))",

@@ -1,13 +1,13 @@
 //! `weight`: the moment of a weight that the declared model has no column for, as on a hinge declared without gravity.
 
-use super::{Entry, Family, Key, Ladder, Law};
+use super::{Entry, Family, Key, Law, SpeedLadder};
 use crate::robot::JointKind;
 
 pub static ENTRY: Entry = Entry {
     name: "weight",
     families: &[Family::Position],
     keys: &[Key::torque("sin"), Key::torque("cos")],
-    ladder: Some(Ladder::USUAL),
+    ladder: Some(SpeedLadder::USUAL),
     separate_by: "log a slow sweep over the whole travel with two payloads (a weight grows with them, a spring does not)",
     formula: "sin * sin(q) + cos * cos(q)",
     source: "a link that hangs on the joint, where the robot file states no gravity",

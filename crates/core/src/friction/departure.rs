@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::plateau::net_torques;
-use super::prepare::Prepared;
+use super::prepare::PreparedProblem;
 
 /// How speeds are parted, as for least squares.
 struct Limits {
@@ -24,14 +24,14 @@ const LIMITS: Limits = Limits {
 
 /// A class of direction and speed: means of the passes through it, and rows.
 #[derive(Default)]
-struct Class {
+struct PassClass {
     means: Vec<f64>,
     rows: usize,
 }
 
 /// Mean square of the mean departure from `law` in classes of speed, beyond what their passes differ by [N^2 or (Nm)^2].
-pub(super) fn departure(prepared: &Prepared, p: &[f64], law: &dyn Fn(f64) -> f64) -> f64 {
-    let mut classes: BTreeMap<i64, Class> = BTreeMap::new();
+pub(super) fn departure(prepared: &PreparedProblem, p: &[f64], law: &dyn Fn(f64) -> f64) -> f64 {
+    let mut classes: BTreeMap<i64, PassClass> = BTreeMap::new();
     let class_of = |v: f64| {
         let octaves = (v.abs() / (LIMITS.lowest * prepared.problem.velocity_scale)).log2();
         let class = 1 + (LIMITS.per_octave * octaves) as i64;

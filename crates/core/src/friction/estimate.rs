@@ -3,26 +3,26 @@
 use nalgebra::DVector;
 
 use super::departure::departure;
-use super::excitation::{FrictionError, Speeds, speeds};
-use super::inputs::Inputs;
+use super::excitation::{FrictionError, SpeedCoverage, speeds};
+use super::inputs::FrictionInputs;
 pub use super::joint_estimate::{
-    EstimatedValue, FilterNoise, FrictionCurvePoint, JointEstimate, Nis, Nuisance,
+    EstimatedValue, FilterNoise, FrictionCurvePoint, JointEstimate, NisStatistic, NuisanceQuantity,
 };
-use super::passes::{GivenNoise, Maximum, fewer_terms, maximise, settle_on};
+use super::passes::{GivenNoise, LikelihoodMaximum, fewer_terms, maximise, settle_on};
 use super::plateau::plateaus;
-use super::prepare::Prepared;
+use super::prepare::PreparedProblem;
 use super::problem::{FRICTION, FrictionProblem};
 use super::slope::{open_above, profile_slope};
 use super::smoothing::{add_choices, bands};
 use super::start::{FilterStart, constant_inertia, from_log};
 use super::thinned::thinned;
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
 
 /// What the user may give beside the logs.
 #[derive(Debug, Clone, Default)]
-pub struct Options {
+pub struct FrictionOptions {
     /// Friction law to start from, beside the starts that the log gives.
     pub start: Option<DoubleTanh>,
     /// Inertia to start from [kg or kg m^2]; only with `start`.
@@ -43,7 +43,7 @@ const SEARCHED: usize = 60_000;
 /// Starts taken from the log.
 const LOG_STARTS: usize = 4;
 
-/// Factor from the position filter's cut-off to the narrower one of [`Inputs::narrower`].
+/// Factor from the position filter's cut-off to the narrower one of [`FrictionInputs::narrower`].
 pub const NARROWER: f64 = 0.7;
 
 /// Estimates the friction of one joint. With `inputs`, the motion of the other joints is narrowed as
@@ -55,9 +55,9 @@ pub const NARROWER: f64 = 0.7;
 pub fn estimate(
     joint: &str,
     names: &[String],
-    prepared: &Prepared,
-    inputs: Option<&Inputs>,
-    options: &Options,
+    prepared: &PreparedProblem,
+    inputs: Option<&FrictionInputs>,
+    options: &FrictionOptions,
 ) -> Result<JointEstimate, FrictionError> {
     let problem = &prepared.problem;
     let speeds = speeds(joint, &prepared.velocity, problem.parameters())?;
@@ -99,7 +99,7 @@ pub fn estimate(
     if let Some((found, problem, settled)) = bands(prepared, inputs, &maximum, &options.noise) {
         cutoffs = found;
         maximum = settled;
-        banded = Some(Prepared {
+        banded = Some(PreparedProblem {
             problem,
             ..prepared.clone()
         });
@@ -128,7 +128,7 @@ fn judged(joint: &str, mut e: JointEstimate) -> Result<JointEstimate, FrictionEr
     if e.power() <= 0.0 {
         return Err(FrictionError::Drives { joint });
     }
-    if e.ending != Ending::Converged {
+    if e.ending != IterationEnding::Converged {
         // a bound holds wherever the search was left: it is what the rows show of one side
         for value in &mut e.values {
             if value.verdict != Verdict::LowerBound {
@@ -141,9 +141,9 @@ fn judged(joint: &str, mut e: JointEstimate) -> Result<JointEstimate, FrictionEr
 
 fn assemble(
     names: &[String],
-    prepared: &Prepared,
-    maximum: Maximum,
-    speeds: Speeds,
+    prepared: &PreparedProblem,
+    maximum: LikelihoodMaximum,
+    speeds: SpeedCoverage,
 ) -> JointEstimate {
     let problem = &prepared.problem;
     let maximum = steeper_first(maximum);
@@ -167,7 +167,7 @@ fn assemble(
         curve: curve(&law, &covariance, speeds.covered, CURVE_STEPS),
         curve_beyond: curve(&law, &covariance, [next, BEYOND * fastest], BEYOND_STEPS),
         plateaus: plateaus(prepared, p),
-        nis: Nis {
+        nis: NisStatistic {
             mean: s.window_nis,
             lower_95: (1.0 - half).max(0.0),
             upper_95: 1.0 + half,
@@ -192,7 +192,7 @@ fn assemble(
 }
 
 /// The same maximum with slope_1 the steeper one: a swap of the two tanh terms is the same law.
-fn steeper_first(mut maximum: Maximum) -> Maximum {
+fn steeper_first(mut maximum: LikelihoodMaximum) -> LikelihoodMaximum {
     if maximum.one_term() {
         maximum.parameters[4] = maximum.parameters[3];
     } else if maximum.parameters[3] < maximum.parameters[4] {
@@ -207,7 +207,10 @@ fn steeper_first(mut maximum: Maximum) -> Maximum {
 }
 
 /// Covariance of the law's parameters in SI units.
-fn covariance(problem: &FrictionProblem, maximum: &Maximum) -> [[f64; FRICTION]; FRICTION] {
+fn covariance(
+    problem: &FrictionProblem,
+    maximum: &LikelihoodMaximum,
+) -> [[f64; FRICTION]; FRICTION] {
     let jacobian = problem.jacobian(&maximum.parameters);
     std::array::from_fn(|i| {
         std::array::from_fn(|j| jacobian[i] * jacobian[j] * maximum.covariance[(i, j)])
@@ -217,7 +220,7 @@ fn covariance(problem: &FrictionProblem, maximum: &Maximum) -> [[f64; FRICTION];
 /// Parameter i of the law with its verdict; a slope that is open has a bound from below, where the log gives one.
 fn value(
     problem: &FrictionProblem,
-    maximum: &Maximum,
+    maximum: &LikelihoodMaximum,
     law: &DoubleTanh,
     covariance: &[[f64; FRICTION]; FRICTION],
     i: usize,
@@ -286,7 +289,7 @@ pub fn curve_std(law: &DoubleTanh, covariance: &[[f64; FRICTION]; FRICTION], v: 
 }
 
 /// Residual torque along the smoothed motion under a law of friction, and the same over the torque.
-fn residual(prepared: &Prepared, p: &[f64], law: &dyn Fn(f64) -> f64) -> (f64, f64) {
+fn residual(prepared: &PreparedProblem, p: &[f64], law: &dyn Fn(f64) -> f64) -> (f64, f64) {
     let problem = &prepared.problem;
     let (eta, e) = (&p[FRICTION..], problem.nuisance);
     let (mut square, mut torque, mut n) = (0.0, 0.0, 0usize);
@@ -309,7 +312,11 @@ fn residual(prepared: &Prepared, p: &[f64], law: &dyn Fn(f64) -> f64) -> (f64, f
 }
 
 /// Mean inertia, offset, and every direction that the log determined.
-fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nuisance> {
+fn nuisance(
+    names: &[String],
+    prepared: &PreparedProblem,
+    maximum: &LikelihoodMaximum,
+) -> Vec<NuisanceQuantity> {
     let problem = &prepared.problem;
     let e = problem.nuisance;
     let eta = DVector::from_column_slice(&maximum.parameters[FRICTION..]);
@@ -324,7 +331,7 @@ fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nui
     let (inertia, inertia_std) = of(&mean);
     let offset_row = prepared.back.row(prepared.back.nrows() - 1).transpose();
     let (offset, offset_std) = of(&offset_row);
-    let nuisance = |name: String, value: f64, std: f64, unit: &str| Nuisance {
+    let nuisance = |name: String, value: f64, std: f64, unit: &str| NuisanceQuantity {
         name,
         value,
         std,

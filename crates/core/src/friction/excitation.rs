@@ -114,14 +114,19 @@ pub fn moving_joint(
 
 /// Speeds that the moving joint reached.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Speeds {
+#[schemars(rename = "Speeds")]
+pub struct SpeedCoverage {
     /// Smallest and largest speed with data in either direction [1/s].
     #[serde(rename = "speeds_covered")]
     pub covered: [f64; 2],
 }
 
 /// Checks that a joint's velocity shows friction: both directions, enough samples.
-pub fn speeds(joint: &str, velocity: &[f64], unknowns: usize) -> Result<Speeds, FrictionError> {
+pub fn speeds(
+    joint: &str,
+    velocity: &[f64],
+    unknowns: usize,
+) -> Result<SpeedCoverage, FrictionError> {
     let size = rms(velocity.iter().copied());
     let moving = |v: &&f64| v.abs() > 1e-3 * size;
     let samples = velocity.iter().filter(moving).count();
@@ -152,7 +157,7 @@ pub fn speeds(joint: &str, velocity: &[f64], unknowns: usize) -> Result<Speeds, 
         });
     }
     let at = |v: &[f64], share: f64| v[((v.len() - 1) as f64 * share) as usize];
-    Ok(Speeds {
+    Ok(SpeedCoverage {
         covered: [
             at(&forward, 0.02).max(at(&backward, 0.02)),
             at(&forward, 0.995).min(at(&backward, 0.995)),

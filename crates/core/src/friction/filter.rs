@@ -6,7 +6,7 @@
 //! alone.
 
 use super::problem::{FRICTION, FrictionProblem, NoiseLevels};
-use super::propagate::{SampleInterval, ScaledLaw, Transition, with_sensitivities};
+use super::propagate::{SampleInterval, ScaledLaw, StateTransition, with_sensitivities};
 
 /// Estimate of the filter after a pass over all records.
 #[derive(Debug, Clone)]
@@ -26,7 +26,7 @@ pub struct ExtendedKalmanFilter {
     column: Vec<f64>,
     row_q: Vec<f64>,
     row_v: Vec<f64>,
-    transition: Transition,
+    transition: StateTransition,
 }
 
 impl ExtendedKalmanFilter {
@@ -40,7 +40,7 @@ impl ExtendedKalmanFilter {
             column: vec![0.0; n],
             row_q: vec![0.0; n],
             row_v: vec![0.0; n],
-            transition: Transition::new(n - 2),
+            transition: StateTransition::new(n - 2),
         }
     }
 

@@ -7,9 +7,9 @@
 //! then leans on the friction. How far each of these accelerations can be narrowed before it loses
 //! more than it gains, the innovation likelihood of the moving joint says (`bands`).
 
-use super::prepare::{Prepared, SensorModel, SmoothedMotion, prepare_again};
+use super::prepare::{PreparedProblem, SensorModel, SmoothedMotion, prepare_again};
 use super::problem::FrictionProblem;
-use crate::math::sos::Sos;
+use crate::math::sos::SosFilter;
 use crate::math::zero_phase::ZeroPhase;
 use crate::robot::Robot;
 
@@ -17,7 +17,7 @@ use crate::robot::Robot;
 const ORDER: usize = 4;
 
 /// All that the one-joint problem was made from.
-pub struct Inputs<'a> {
+pub struct FrictionInputs<'a> {
     pub robot: &'a Robot,
     pub joint: usize,
     pub motions: &'a [SmoothedMotion],
@@ -26,17 +26,17 @@ pub struct Inputs<'a> {
     pub sensors: &'a SensorModel<'a>,
 }
 
-impl Inputs<'_> {
+impl FrictionInputs<'_> {
     /// The problem `like`, the accelerations of the other joints kept below `cutoffs` [Hz], one per
     /// joint; as they are where it is infinite or beyond what the sampling rate allows.
-    pub fn problem(&self, like: &Prepared, cutoffs: &[f64]) -> Option<FrictionProblem> {
+    pub fn problem(&self, like: &PreparedProblem, cutoffs: &[f64]) -> Option<FrictionProblem> {
         self.build(self.motions, like, cutoffs)
     }
 
     /// The same from the narrower smoothing, its cut-offs lowered by the same `factor`.
     pub fn narrower(
         &self,
-        like: &Prepared,
+        like: &PreparedProblem,
         cutoffs: &[f64],
         factor: f64,
     ) -> Option<FrictionProblem> {
@@ -47,7 +47,7 @@ impl Inputs<'_> {
     fn build(
         &self,
         motions: &[SmoothedMotion],
-        like: &Prepared,
+        like: &PreparedProblem,
         cutoffs: &[f64],
     ) -> Option<FrictionProblem> {
         if cutoffs.iter().all(|c| c.is_infinite()) {
@@ -70,7 +70,7 @@ impl Inputs<'_> {
             if i == self.joint || !cutoff.is_finite() {
                 continue;
             }
-            let Ok(sos) = Sos::butterworth(ORDER, cutoff, rate) else {
+            let Ok(sos) = SosFilter::butterworth(ORDER, cutoff, rate) else {
                 continue;
             };
             let mut channel: Vec<f64> = motion.a.iter().skip(i).step_by(n).copied().collect();

@@ -3,11 +3,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::excitation::Speeds;
+use super::excitation::SpeedCoverage;
 use super::passes::ONE_TERM;
-use super::plateau::{Missed, Plateau, missed};
+use super::plateau::{MissedPlateau, TorquePlateau, missed};
 use super::problem::FRICTION;
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::Verdict;
 
@@ -32,7 +32,8 @@ pub struct FrictionCurvePoint {
 
 /// A nuisance quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Nuisance {
+#[schemars(rename = "Nuisance")]
+pub struct NuisanceQuantity {
     pub name: String,
     pub value: f64,
     pub std: f64,
@@ -45,7 +46,8 @@ pub struct Nuisance {
 /// any model. What shows a wrong one is that its innovations are alike: so the mean is over windows
 /// of 50 samples, each the square of the window's summed normalised innovations over their number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Nis {
+#[schemars(rename = "Nis")]
+pub struct NisStatistic {
     /// Mean over windows; 1 where the filter's covariance is true and the innovations are white.
     pub mean: f64,
     /// 95 % bounds of that mean.
@@ -59,7 +61,7 @@ pub struct Nis {
     pub share_inside: f64,
 }
 
-impl Nis {
+impl NisStatistic {
     /// Whether the mean is inside its bounds.
     pub fn consistent(&self) -> bool {
         (self.lower_95..=self.upper_95).contains(&self.mean)
@@ -70,7 +72,7 @@ impl Nis {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JointEstimate {
     /// How the search ended.
-    pub ending: Ending,
+    pub ending: IterationEnding,
     /// Starting points of the search.
     pub starts: usize,
     /// The law at the maximum of the likelihood.
@@ -83,16 +85,16 @@ pub struct JointEstimate {
     #[serde(skip)]
     pub covariance: [[f64; FRICTION]; FRICTION],
     /// What was estimated along, and is no friction.
-    pub nuisance: Vec<Nuisance>,
+    pub nuisance: Vec<NuisanceQuantity>,
     #[serde(flatten)]
-    pub speeds: Speeds,
+    pub speeds: SpeedCoverage,
     /// The law over the speeds covered: 50 equal steps in each direction.
     pub curve: Vec<FrictionCurvePoint>,
     /// The law at speeds that the log does not cover, up to twice the largest of those: a forecast.
     pub curve_beyond: Vec<FrictionCurvePoint>,
     /// Mean torques at constant speed, which took no part in the fit.
-    pub plateaus: Vec<Plateau>,
-    pub nis: Nis,
+    pub plateaus: Vec<TorquePlateau>,
+    pub nis: NisStatistic,
     pub noise: FilterNoise,
     /// Factor by which coloured innovations widened the covariance.
     pub widening: f64,
@@ -146,7 +148,7 @@ impl JointEstimate {
     }
 
     /// Speeds at which the curve misses the plateaus' mean torque.
-    pub fn missed_plateaus(&self) -> Vec<Missed> {
+    pub fn missed_plateaus(&self) -> Vec<MissedPlateau> {
         missed(&self.plateaus, &|v| self.law.torque(v))
     }
 }

@@ -11,11 +11,11 @@ use std::convert::Infallible;
 use nalgebra::{DMatrix, DVector};
 
 use super::filter::ExtendedKalmanFilter;
-use super::prepare::Prepared;
+use super::prepare::PreparedProblem;
 use super::problem::{FRICTION, FilterParameters, FrictionProblem, NoiseLevels};
 use super::score::{LikelihoodScore, log_likelihood, score};
 use super::start::FilterStart;
-use crate::math::descent::{Ending, StepControl, Trial, descend};
+use crate::math::descent::{IterationEnding, StepControl, Trial, descend};
 use crate::math::minimise;
 
 /// Factors on both noises in the annealed passes from a start that may be far off, and from one of a linear fit.
@@ -61,13 +61,13 @@ pub struct GivenNoise {
 
 /// Maximum of the innovation likelihood of one joint.
 #[derive(Debug, Clone)]
-pub(super) struct Maximum {
+pub(super) struct LikelihoodMaximum {
     pub parameters: FilterParameters,
     /// Covariance in the filter's coordinates, widened where the score is coloured.
     pub covariance: DMatrix<f64>,
     pub noise: NoiseLevels,
     pub score: LikelihoodScore,
-    pub ending: Ending,
+    pub ending: IterationEnding,
     /// Factor by which coloured innovations widened the covariance.
     pub widening: f64,
     /// A slope stands at an end of its range.
@@ -77,7 +77,7 @@ pub(super) struct Maximum {
     pub starts: usize,
 }
 
-impl Maximum {
+impl LikelihoodMaximum {
     /// Whether one Coulomb term does.
     pub fn one_term(&self) -> bool {
         !self.fixed.is_empty()
@@ -109,10 +109,10 @@ pub(super) fn first_noise(problem: &FrictionProblem, given: &GivenNoise) -> Nois
 
 /// Runs every start through the annealed passes, then refines the best.
 pub(super) fn maximise(
-    prepared: &Prepared,
+    prepared: &PreparedProblem,
     starts: &[FilterStart],
     given: &GivenNoise,
-) -> Option<Maximum> {
+) -> Option<LikelihoodMaximum> {
     let problem = &prepared.problem;
     let noise = first_noise(problem, given);
     let spread = spread(problem);
@@ -160,9 +160,9 @@ pub(super) fn maximise(
 /// The maximum of `problem` from that of a share of its rows.
 pub(super) fn settle_on(
     problem: &FrictionProblem,
-    maximum: &Maximum,
+    maximum: &LikelihoodMaximum,
     given: &GivenNoise,
-) -> Option<Maximum> {
+) -> Option<LikelihoodMaximum> {
     let (p, noise) = (maximum.parameters.clone(), maximum.noise);
     let refined = refine(problem, p, noise, FIRST_STEPS, &[]);
     let (fixed, starts) = (maximum.fixed, maximum.starts);
@@ -177,7 +177,7 @@ pub(super) fn settle(
     given: &GivenNoise,
     fixed: &'static [usize],
     starts: usize,
-) -> Option<Maximum> {
+) -> Option<LikelihoodMaximum> {
     for _ in 0..2 {
         noise = tune(problem, &refined.parameters, noise, given);
         refined = refine(problem, refined.parameters, noise, MOST_STEPS, fixed);
@@ -188,9 +188,9 @@ pub(super) fn settle(
 /// The maximum with one Coulomb term, where the log is as likely without a second.
 pub(super) fn fewer_terms(
     problem: &FrictionProblem,
-    maximum: &Maximum,
+    maximum: &LikelihoodMaximum,
     given: &GivenNoise,
-) -> Option<Maximum> {
+) -> Option<LikelihoodMaximum> {
     if maximum.one_term() || second_is_known(maximum) {
         return None;
     }
@@ -216,7 +216,7 @@ pub(super) fn fewer_terms(
 }
 
 /// Whether height and slope of both terms are known to a tenth, and the slopes are well apart.
-fn second_is_known(maximum: &Maximum) -> bool {
+fn second_is_known(maximum: &LikelihoodMaximum) -> bool {
     let (p, c) = (&maximum.parameters, &maximum.covariance);
     let height = |i: usize| c[(i, i)] < (0.1 * p[i]).powi(2);
     // slopes are logarithms
@@ -228,7 +228,7 @@ fn second_is_known(maximum: &Maximum) -> bool {
 pub(super) struct RefinedParameters {
     pub parameters: FilterParameters,
     pub score: LikelihoodScore,
-    pub ending: Ending,
+    pub ending: IterationEnding,
 }
 
 fn block(problem: &FrictionProblem) -> usize {
@@ -349,7 +349,7 @@ fn finish(
     noise: NoiseLevels,
     fixed: &'static [usize],
     starts: usize,
-) -> Option<Maximum> {
+) -> Option<LikelihoodMaximum> {
     let mut h = refined.score.information.clone();
     for (j, s) in spread(problem).iter().enumerate() {
         h[(j, j)] += 1.0 / (s * s);
@@ -374,7 +374,7 @@ fn finish(
         let w = refined.parameters[j].exp() / problem.velocity_scale;
         w > 0.99 * hi || w < 1.01 * lo
     });
-    Some(Maximum {
+    Some(LikelihoodMaximum {
         parameters: refined.parameters,
         covariance: covariance * widening,
         noise,

@@ -7,12 +7,13 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::prepare::Prepared;
+use super::prepare::PreparedProblem;
 use super::problem::FRICTION;
 
 /// Mean torque over one plateau, less the nuisance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Plateau {
+#[schemars(rename = "Plateau")]
+pub struct TorquePlateau {
     /// Mean velocity [m/s or rad/s].
     pub v: f64,
     /// Mean torque [N or Nm].
@@ -36,7 +37,7 @@ const SIGNIFICANT_ERRORS: f64 = 3.0;
 
 /// The curve at a speed whose plateaus it misses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Missed {
+pub struct MissedPlateau {
     /// Mean velocity of the plateaus [m/s or rad/s].
     pub v: f64,
     /// Their mean torque, and that of the curve [N or Nm].
@@ -46,32 +47,33 @@ pub struct Missed {
 
 /// Speeds at which the mean over all plateaus is off the `curve` by more than 3 % and by more than
 /// its own standard error explains, the farthest first.
-pub fn missed(plateaus: &[Plateau], curve: &dyn Fn(f64) -> f64) -> Vec<Missed> {
-    let mut sorted: Vec<&Plateau> = plateaus.iter().collect();
+pub fn missed(plateaus: &[TorquePlateau], curve: &dyn Fn(f64) -> f64) -> Vec<MissedPlateau> {
+    let mut sorted: Vec<&TorquePlateau> = plateaus.iter().collect();
     sorted.sort_by(|a, b| a.v.total_cmp(&b.v));
-    let alike = |a: &&Plateau, b: &&Plateau| (b.v - a.v).abs() <= ONE_SPEED * a.v.abs();
-    let misses = |group: &[&Plateau]| {
+    let alike = |a: &&TorquePlateau, b: &&TorquePlateau| (b.v - a.v).abs() <= ONE_SPEED * a.v.abs();
+    let misses = |group: &[&TorquePlateau]| {
         let n = group.len() as f64;
-        let mean = |of: &dyn Fn(&Plateau) -> f64| group.iter().map(|p| of(p)).sum::<f64>() / n;
-        let off = |p: &Plateau| p.torque - curve(p.v);
+        let mean =
+            |of: &dyn Fn(&TorquePlateau) -> f64| group.iter().map(|p| of(p)).sum::<f64>() / n;
+        let off = |p: &TorquePlateau| p.torque - curve(p.v);
         let (v, torque, difference) = (mean(&|p| p.v), mean(&|p| p.torque), mean(&off));
         // by the standard error of each, and by how they differ from one another
         let within = mean(&|p| p.std * p.std) / n;
         let between = mean(&|p| (off(p) - difference).powi(2)) / n;
         let sure = difference.abs() > SIGNIFICANT_ERRORS * within.max(between).sqrt();
         let curve = torque - difference;
-        let missed = Missed { v, torque, curve };
+        let missed = MissedPlateau { v, torque, curve };
         (sure && difference.abs() > FOLLOWS * torque.abs()).then_some(missed)
     };
-    let mut out: Vec<Missed> = sorted.chunk_by(alike).filter_map(misses).collect();
-    let share = |m: &Missed| (m.curve / m.torque - 1.0).abs();
+    let mut out: Vec<MissedPlateau> = sorted.chunk_by(alike).filter_map(misses).collect();
+    let share = |m: &MissedPlateau| (m.curve / m.torque - 1.0).abs();
     out.sort_by(|a, b| share(b).total_cmp(&share(a)));
     out
 }
 
 /// Speed and torque less the nuisance of every row, record by record, at the estimate `p`.
 pub(super) fn net_torques<'a>(
-    prepared: &'a Prepared,
+    prepared: &'a PreparedProblem,
     p: &'a [f64],
 ) -> impl Iterator<Item = (&'a [f64], Vec<f64>)> {
     let problem = &prepared.problem;
@@ -92,7 +94,7 @@ pub(super) fn net_torques<'a>(
 }
 
 /// Plateaus of all records at the estimate `p`.
-pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
+pub fn plateaus(prepared: &PreparedProblem, p: &[f64]) -> Vec<TorquePlateau> {
     let problem = &prepared.problem;
     let mut out = Vec::new();
     for (record, (v, torques)) in problem.records.iter().zip(net_torques(prepared, p)) {
@@ -118,7 +120,7 @@ pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
                     (m - mean) * (m - mean)
                 };
                 let spread = (0..parts).map(square).sum::<f64>();
-                out.push(Plateau {
+                out.push(TorquePlateau {
                     v: v[k..end].iter().sum::<f64>() / count,
                     torque: mean,
                     std: (spread / (parts * (parts - 1)).max(1) as f64).sqrt(),
@@ -137,8 +139,8 @@ pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
 mod tests {
     use super::*;
 
-    fn plateau(v: f64, torque: f64) -> Plateau {
-        Plateau {
+    fn plateau(v: f64, torque: f64) -> TorquePlateau {
+        TorquePlateau {
             v,
             torque,
             std: 0.01,
@@ -150,7 +152,7 @@ mod tests {
     fn a_speed_whose_plateaus_the_curve_misses_is_named_and_no_other() {
         let curve = |v: f64| 2.0 * v.signum();
         // right; off by 5 %; off by 5 % but as unsure as that; off by 1 %
-        let unsure = Plateau {
+        let unsure = TorquePlateau {
             std: 0.06,
             ..plateau(-0.4, -2.1)
         };

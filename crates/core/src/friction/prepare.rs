@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::problem::{FrictionProblem, Record};
+use super::problem::{FrictionProblem, JointRecord};
 use crate::math::rank;
 use crate::math::rfactor::RFactor;
 use crate::robot::Robot;
@@ -38,7 +38,7 @@ const LONGEST_RECORD: usize = 40_000;
 
 /// The problem of one joint with the map from its nuisance states back to the robot's parameters.
 #[derive(Debug, Clone)]
-pub struct Prepared {
+pub struct PreparedProblem {
     pub problem: FrictionProblem,
     /// Robot parameters (and the offset, last) = `back` times the nuisance states.
     pub back: DMatrix<f64>,
@@ -69,7 +69,7 @@ pub fn prepare(
     joint: usize,
     motions: &[SmoothedMotion],
     sensors: &SensorModel,
-) -> Option<Prepared> {
+) -> Option<PreparedProblem> {
     let n = robot.joints();
     let of_joint = |channel: fn(&SmoothedMotion) -> &Vec<f64>| {
         let all = motions.iter().map(channel);
@@ -88,7 +88,7 @@ pub fn prepare(
     let built = build(robot, joint, motions, sensors, &back)?;
     let acceleration_scale = rms(built.acceleration.iter().copied()).max(f64::MIN_POSITIVE);
     let step = median_step(&built.records);
-    Some(Prepared {
+    Some(PreparedProblem {
         problem: FrictionProblem {
             records: built.records,
             nuisance: back.ncols(),
@@ -168,7 +168,7 @@ pub(super) fn prepare_again(
     joint: usize,
     motions: &[SmoothedMotion],
     sensors: &SensorModel,
-    like: &Prepared,
+    like: &PreparedProblem,
 ) -> Option<FrictionProblem> {
     let built = build(robot, joint, motions, sensors, &like.back)?;
     Some(FrictionProblem {
@@ -180,7 +180,7 @@ pub(super) fn prepare_again(
 /// Records of all motions, with velocity and acceleration of the moving joint.
 #[derive(Default)]
 struct BuiltRecords {
-    records: Vec<Record>,
+    records: Vec<JointRecord>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
 }
@@ -218,13 +218,13 @@ fn record(
     piece: Range<usize>,
     sensors: &SensorModel,
     back: &DMatrix<f64>,
-) -> Record {
+) -> JointRecord {
     let (n, e) = (robot.joints(), back.ncols());
     let first = piece.start;
-    let mut record = Record {
+    let mut record = JointRecord {
         t: motion.t[piece.clone()].to_vec(),
         v0: motion.v[first * n + joint],
-        ..Record::default()
+        ..JointRecord::default()
     };
     for k in piece.clone() {
         let pose = &motion.measured[k * n..(k + 1) * n];
@@ -292,7 +292,7 @@ fn coefficients(
     (m, h)
 }
 
-fn median_step(records: &[Record]) -> f64 {
+fn median_step(records: &[JointRecord]) -> f64 {
     let records = records.iter();
     let mut steps: Vec<f64> = records
         .flat_map(|r| r.t.windows(2).map(|w| w[1] - w[0]))

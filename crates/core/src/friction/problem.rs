@@ -13,7 +13,7 @@ pub const FRICTION: usize = 5;
 /// One uninterrupted record of one joint. All slices have one entry per sample, except those of
 /// the intervals `[t_k, t_k+1)`, which have one less (`tau`, `m`, `h`).
 #[derive(Debug, Clone, Default)]
-pub struct Record {
+pub struct JointRecord {
     /// Time of each sample [s], strictly increasing.
     pub t: Vec<f64>,
     /// Measured position [m or rad].
@@ -33,7 +33,7 @@ pub struct Record {
 /// All records of one joint and the scales of its parameters.
 #[derive(Debug, Clone)]
 pub struct FrictionProblem {
-    pub records: Vec<Record>,
+    pub records: Vec<JointRecord>,
     /// Number of nuisance parameters.
     pub nuisance: usize,
     /// Scale of the torque [N or Nm] and of the velocity [1/s]: parameters are relative to

@@ -5,7 +5,7 @@
 //! transition matrix and the sensitivities to the parameters are integrals along the same steps by
 //! Simpson's rule with the exact exponential of the local decay.
 
-use super::problem::{FRICTION, FrictionProblem, Record};
+use super::problem::{FRICTION, FrictionProblem, JointRecord};
 use crate::math::hyperbolic::tanh;
 
 /// Longest sub-step relative to the local time constant of the friction.
@@ -15,7 +15,7 @@ const MOST_STEPS: usize = 64;
 
 /// What one interval does to the state and to small changes of state and parameters.
 #[derive(Debug, Clone, Default)]
-pub struct Transition {
+pub struct StateTransition {
     /// dq/dv and dv/dv at the end; dq/dq = 1 and dv/dq = 0.
     pub q_v: f64,
     pub v_v: f64,
@@ -27,12 +27,12 @@ pub struct Transition {
     pub n_v: f64,
 }
 
-impl Transition {
+impl StateTransition {
     pub fn new(parameters: usize) -> Self {
-        Transition {
+        StateTransition {
             b_q: vec![0.0; parameters],
             b_v: vec![0.0; parameters],
-            ..Transition::default()
+            ..StateTransition::default()
         }
     }
 }
@@ -145,7 +145,7 @@ pub struct SampleInterval<'a> {
 impl<'a> SampleInterval<'a> {
     /// Interval k of a record with so many nuisance parameters.
     #[inline(always)]
-    pub fn of(record: &'a Record, k: usize, nuisance: usize) -> Self {
+    pub fn of(record: &'a JointRecord, k: usize, nuisance: usize) -> Self {
         let row = k * nuisance..(k + 1) * nuisance;
         SampleInterval {
             dt: record.t[k + 1] - record.t[k],
@@ -203,7 +203,7 @@ pub(crate) fn with_sensitivities(
     least: f64,
     q: f64,
     v: f64,
-    out: &mut Transition,
+    out: &mut StateTransition,
 ) -> (f64, f64) {
     let eta = &p[FRICTION..];
     let (minv, net) = known(interval, eta, least);
@@ -296,7 +296,7 @@ mod tests {
         };
         // across standstill Simpson's rule meets the bend of the tanh with three points a step
         for (v, tolerance) in [(-1e-3, 1e-2), (0.02, 6e-3), (0.9, 1e-4)] {
-            let mut t = Transition::new(7);
+            let mut t = StateTransition::new(7);
             let law = ScaledLaw::new(&problem, &P);
             let x = with_sensitivities(&law, &P, &interval, 1e-6, 0.1, v, &mut t);
             assert_eq!(x, end(&P, v, 3.0));

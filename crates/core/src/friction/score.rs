@@ -11,8 +11,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Record};
-use super::propagate::{SampleInterval, ScaledLaw, Transition, known, state, with_sensitivities};
+use super::problem::{FRICTION, FrictionProblem, JointRecord, NoiseLevels};
+use super::propagate::{
+    SampleInterval, ScaledLaw, StateTransition, known, state, with_sensitivities,
+};
 
 /// Result of a pass at fixed parameters.
 #[derive(Debug, Clone)]
@@ -36,7 +38,11 @@ pub struct LikelihoodScore {
 }
 
 /// Two-state covariance (qq, qv, vv) at the first sample of a record.
-fn first_covariance(problem: &FrictionProblem, record: &Record, noise: NoiseLevels) -> [f64; 3] {
+fn first_covariance(
+    problem: &FrictionProblem,
+    record: &JointRecord,
+    noise: NoiseLevels,
+) -> [f64; 3] {
     let speed = 0.1 * problem.velocity_scale;
     [record.r[0] * noise.position_factor, 0.0, speed.powi(2)]
 }
@@ -116,14 +122,14 @@ impl InnovationWindows {
 }
 
 /// Derivatives of the states by the parameters.
-struct Sensitivities {
+struct StateSensitivities {
     q: Vec<f64>,
     v: Vec<f64>,
 }
 
-impl Sensitivities {
+impl StateSensitivities {
     #[inline(always)]
-    fn propagate(&mut self, t: &Transition) {
+    fn propagate(&mut self, t: &StateTransition) {
         let inputs = t.b_q.iter().zip(&t.b_v);
         for ((q, v), (b_q, b_v)) in self.q.iter_mut().zip(&mut self.v).zip(inputs) {
             *q += t.q_v * *v + b_q;
@@ -235,7 +241,7 @@ impl RecordScore {
 
 fn of_record(
     problem: &FrictionProblem,
-    record: &Record,
+    record: &JointRecord,
     law: &ScaledLaw,
     parameters: &[f64],
     noise: NoiseLevels,
@@ -243,9 +249,9 @@ fn of_record(
 ) -> RecordScore {
     let np = problem.parameters();
     let mut out = RecordScore::none(np);
-    let mut t = Transition::new(np);
+    let mut t = StateTransition::new(np);
     let s2 = noise.torque * noise.torque;
-    let mut w = Sensitivities {
+    let mut w = StateSensitivities {
         q: vec![0.0; np],
         v: vec![0.0; np],
     };
@@ -311,7 +317,7 @@ pub(super) fn log_likelihood(
 
 fn likelihood_of_record(
     problem: &FrictionProblem,
-    record: &Record,
+    record: &JointRecord,
     law: &ScaledLaw,
     parameters: &[f64],
     noise: NoiseLevels,

@@ -4,7 +4,7 @@
 //! into its place. A standard deviation says less: it knows the curvature at the maximum alone, and a likelihood that
 //! rises to a plateau is curved at its edge.
 
-use super::passes::{Maximum, refine};
+use super::passes::{LikelihoodMaximum, refine};
 use super::problem::{FilterParameters, FrictionProblem};
 
 /// Drop of the log-likelihood at a one-sided 95 % bound: half of 1.645 squared.
@@ -15,12 +15,12 @@ const GAUSS_NEWTON_STEPS: usize = 8;
 const STRIDE: f64 = 0.25;
 
 /// Fall of the log-likelihood from the maximum to `value`; coloured innovations count for less, as in the covariance.
-fn drop(maximum: &Maximum, value: f64) -> f64 {
+fn drop(maximum: &LikelihoodMaximum, value: f64) -> f64 {
     (maximum.score.log_likelihood - value) / maximum.widening
 }
 
 /// Whether the slope with index `i` (3 or 4) may be as steep as any that is tried, the other parameters fitted anew.
-pub(super) fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> bool {
+pub(super) fn open_above(problem: &FrictionProblem, maximum: &LikelihoodMaximum, i: usize) -> bool {
     let mut p = maximum.parameters.clone();
     p[i] = (problem.slope_range.1 * problem.velocity_scale).ln();
     let fixed = [&[i], maximum.fixed].concat();
@@ -29,7 +29,11 @@ pub(super) fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize)
 }
 
 /// One-sided 95 % lower bound of the slope with index `i` (3 or 4); `None` where the whole range is as likely.
-pub(super) fn profile_slope(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> Option<f64> {
+pub(super) fn profile_slope(
+    problem: &FrictionProblem,
+    maximum: &LikelihoodMaximum,
+    i: usize,
+) -> Option<f64> {
     let refined = |p: FilterParameters, fixed: &[usize]| {
         refine(problem, p, maximum.noise, GAUSS_NEWTON_STEPS, fixed)
     };

@@ -2,11 +2,11 @@
 
 use nalgebra::DVector;
 
-use super::inputs::Inputs;
-use super::passes::{GivenNoise, Maximum, RefinedParameters, refine, settle};
-use super::prepare::Prepared;
+use super::inputs::FrictionInputs;
+use super::passes::{GivenNoise, LikelihoodMaximum, RefinedParameters, refine, settle};
+use super::prepare::PreparedProblem;
 use super::problem::{FrictionProblem, NoiseLevels};
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 
 /// Factor on the encoder's variance in the other weighting.
 const COARSER: f64 = 4.0;
@@ -19,11 +19,11 @@ const CHOICE_STEPS: usize = 6;
 
 /// Cut-offs [Hz] of the other joints' accelerations by which the innovations grow likelier, the problem and its maximum.
 pub(super) fn bands(
-    prepared: &Prepared,
-    inputs: &Inputs,
-    maximum: &Maximum,
+    prepared: &PreparedProblem,
+    inputs: &FrictionInputs,
+    maximum: &LikelihoodMaximum,
     given: &GivenNoise,
-) -> Option<(Vec<f64>, FrictionProblem, Maximum)> {
+) -> Option<(Vec<f64>, FrictionProblem, LikelihoodMaximum)> {
     let (noise, fixed) = (maximum.noise, maximum.fixed);
     let mut cutoffs = vec![f64::INFINITY; inputs.robot.joints()];
     let mut best: Option<(FrictionProblem, RefinedParameters)> = None;
@@ -58,7 +58,7 @@ pub(super) fn bands(
 pub(super) fn add_choices(
     problem: &FrictionProblem,
     again: &FrictionProblem,
-    maximum: &mut Maximum,
+    maximum: &mut LikelihoodMaximum,
 ) {
     // innovations cannot show an error that is the same at every reversal
     let p = maximum.parameters.clone();
@@ -68,7 +68,7 @@ pub(super) fn add_choices(
     };
     for (problem, noise) in [(again, maximum.noise), (problem, coarser)] {
         let moved = refine(problem, p.clone(), noise, CHOICE_STEPS, maximum.fixed);
-        if moved.ending != Ending::Diverged {
+        if moved.ending != IterationEnding::Diverged {
             let change = DVector::from_fn(p.len(), |i, _| moved.parameters[i] - p[i]);
             maximum.covariance.ger(1.0, &change, &change, 1.0);
         }

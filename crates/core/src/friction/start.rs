@@ -8,7 +8,7 @@
 use crate::math::hyperbolic::tanh;
 use nalgebra::{DMatrix, DVector};
 
-use super::prepare::Prepared;
+use super::prepare::PreparedProblem;
 use super::problem::FilterParameters;
 
 /// Slopes of the ladder, geometric over the range.
@@ -41,7 +41,7 @@ struct WindowAverages {
 }
 
 impl WindowAverages {
-    fn new(prepared: &Prepared) -> Self {
+    fn new(prepared: &PreparedProblem) -> Self {
         let problem = &prepared.problem;
         let e = problem.nuisance;
         let (fs, vs) = (problem.torque_scale, problem.velocity_scale);
@@ -124,7 +124,7 @@ impl WindowAverages {
 }
 
 /// The best `most` pairs of slopes with their linear fits, pairs apart from one another.
-pub(super) fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
+pub(super) fn from_log(prepared: &PreparedProblem, most: usize) -> Vec<FilterStart> {
     let problem = &prepared.problem;
     let windows = WindowAverages::new(prepared);
     let (lo, hi) = problem.slope_range;
@@ -150,7 +150,11 @@ pub(super) fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
 }
 
 /// Pattern search over the logarithms of the slopes.
-fn polish(prepared: &Prepared, windows: &WindowAverages, slopes: [f64; 2]) -> Option<FilterStart> {
+fn polish(
+    prepared: &PreparedProblem,
+    windows: &WindowAverages,
+    slopes: [f64; 2],
+) -> Option<FilterStart> {
     let problem = &prepared.problem;
     let (lo, hi) = problem.slope_range;
     let mut at = slopes;
@@ -184,7 +188,7 @@ fn polish(prepared: &Prepared, windows: &WindowAverages, slopes: [f64; 2]) -> Op
 }
 
 /// Nuisance that gives a constant inertia as nearly as this motion's columns can, and no gravity.
-pub(super) fn constant_inertia(prepared: &Prepared, inertia: f64) -> Vec<f64> {
+pub(super) fn constant_inertia(prepared: &PreparedProblem, inertia: f64) -> Vec<f64> {
     let e = prepared.problem.nuisance;
     let mut normal = DMatrix::<f64>::zeros(e, e);
     let mut right = DVector::<f64>::zeros(e);

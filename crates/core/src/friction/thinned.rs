@@ -3,14 +3,14 @@
 
 use std::ops::Range;
 
-use super::prepare::Prepared;
-use super::problem::{FrictionProblem, Record};
+use super::prepare::PreparedProblem;
+use super::problem::{FrictionProblem, JointRecord};
 
 /// Samples of one piece.
 const PIECE: usize = 1000;
 
 /// At most about `most` samples in pieces, half of them with a turn of the joint; `None` where the log has no more.
-pub(super) fn thinned(prepared: &Prepared, most: usize) -> Option<Prepared> {
+pub(super) fn thinned(prepared: &PreparedProblem, most: usize) -> Option<PreparedProblem> {
     let records = &prepared.problem.records;
     if prepared.problem.samples() <= most {
         return None;
@@ -43,7 +43,7 @@ pub(super) fn thinned(prepared: &Prepared, most: usize) -> Option<Prepared> {
         let v0 = prepared.velocity[all.start];
         parts.push(part(&records[record], rows, v0, prepared.problem.nuisance));
     }
-    Some(Prepared {
+    Some(PreparedProblem {
         problem: FrictionProblem {
             records: parts,
             ..prepared.problem
@@ -65,10 +65,10 @@ fn evenly(pieces: &[Piece], most: usize) -> Vec<Piece> {
 type Piece = (usize, usize, Range<usize>);
 
 /// Some samples of a record as a record.
-fn part(record: &Record, rows: Range<usize>, v0: f64, nuisance: usize) -> Record {
+fn part(record: &JointRecord, rows: Range<usize>, v0: f64, nuisance: usize) -> JointRecord {
     let intervals = rows.start..rows.end - 1;
     let columns = intervals.start * nuisance..intervals.end * nuisance;
-    Record {
+    JointRecord {
         t: record.t[rows.clone()].to_vec(),
         y: record.y[rows.clone()].to_vec(),
         r: record.r[rows].to_vec(),

@@ -1,7 +1,7 @@
 //! One-joint records for the tests of this room: integrated here, by Euler steps of 10 us, so that
 //! they share no code with the filter.
 
-use super::prepare::{Prepared, SensorModel, SmoothedMotion, prepare};
+use super::prepare::{PreparedProblem, SensorModel, SmoothedMotion, prepare};
 use crate::robot::friction::DoubleTanh;
 use crate::robot::{JointKind, Robot};
 
@@ -73,12 +73,12 @@ impl FrictionTrial {
     }
 
     /// The one-joint problem of that motion.
-    pub fn prepared(&self, seed: u64) -> Prepared {
+    pub fn prepared(&self, seed: u64) -> PreparedProblem {
         self.prepared_of(self.motion(seed))
     }
 
     /// That of another motion.
-    pub fn prepared_of(&self, motion: SmoothedMotion) -> Prepared {
+    pub fn prepared_of(&self, motion: SmoothedMotion) -> PreparedProblem {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let variance = self.step * self.step / 12.0;
         let sensors = SensorModel {

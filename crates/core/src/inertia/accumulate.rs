@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::by_speed::BySpeed;
 use super::columns::{GRADIENT, RegressorColumns};
-use super::scores::Scores;
+use super::scores::BlockScores;
 use crate::math::rfactor::RFactor;
 
 /// Most blocks that are kept per joint.
@@ -31,12 +31,12 @@ pub struct BlockFactor {
     /// [`RegressorColumns::row_width`].
     pub r: Vec<DMatrix<f64>>,
     /// Where this is a whole log, the scores of its parts in time.
-    pub scores: Option<Scores>,
+    pub scores: Option<BlockScores>,
 }
 
 /// Accumulates filtered, decimated rows.
 #[derive(Debug, Clone)]
-pub struct Accumulator {
+pub struct RowAccumulator {
     columns: RegressorColumns,
     open: Vec<RFactor>,
     open_rows: u64,
@@ -82,11 +82,11 @@ impl JointRows {
     }
 }
 
-impl Accumulator {
+impl RowAccumulator {
     /// `block_seconds` is the length of a block to begin with [s].
     pub fn new(columns: RegressorColumns, block_seconds: f64) -> Self {
         let none = || (0..columns.joints).map(|j| RFactor::new(columns.row_width(j)));
-        Accumulator {
+        RowAccumulator {
             moving: vec![JointRows::default(); columns.joints],
             resting: none().map(|r| (JointRows::default(), r)).collect(),
             by_speed: vec![BySpeed::default(); columns.joints],
@@ -473,7 +473,7 @@ impl RegressorColumns {
         rows: impl IntoIterator<Item = [f64; 3]>,
     ) -> BlockFactors {
         let robot = crate::robot::Robot::single_joint("q1", crate::robot::JointKind::Prismatic);
-        let mut all = Accumulator::new(self.clone(), block_seconds);
+        let mut all = RowAccumulator::new(self.clone(), block_seconds);
         let mut channels = vec![0.0; self.channels()];
         for [v, a, tau] in rows {
             self.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::columns::{Own, RegressorColumns};
+use super::columns::{JointTerm, RegressorColumns};
 
 /// How speeds are parted.
 struct Limits {
@@ -24,11 +24,12 @@ const LIMITS: Limits = Limits {
 /// viscous and Coulomb.
 #[derive(Debug, Clone, Default)]
 pub struct BySpeed {
-    classes: Vec<Class>,
+    classes: Vec<SpeedClass>,
 }
 
+/// Sums of the Coulomb column over the rows of one class of speed.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Class {
+pub(super) struct SpeedClass {
     /// Of the Coulomb column with itself.
     pub square: f64,
     /// Of the Coulomb column with the unknowns' columns and the target.
@@ -38,14 +39,15 @@ pub(super) struct Class {
 impl BySpeed {
     /// Adds a row of joint j.
     pub(super) fn add(&mut self, columns: &RegressorColumns, j: usize, row: &[f64]) {
-        let Some(place) = Place::of(columns, j) else {
+        let Some(place) = SpeedColumns::of(columns, j) else {
             return;
         };
         let (speed, level) = (row[place.viscous], row[place.coulomb]);
         let octaves = (speed.abs() / (LIMITS.first * place.rest_speed)).log2();
         let class = ((1.0 + LIMITS.per_octave * octaves).max(0.0) as usize).min(LIMITS.classes - 1);
         let side = usize::from(level < 0.0) * LIMITS.classes;
-        self.classes.resize_with(2 * LIMITS.classes, Class::default);
+        self.classes
+            .resize_with(2 * LIMITS.classes, SpeedClass::default);
         let class = &mut self.classes[side + class];
         class.square += level * level;
         class.product.resize(row.len(), 0.0);
@@ -55,7 +57,7 @@ impl BySpeed {
 
     pub(super) fn merge(&mut self, other: &BySpeed) {
         let most = self.classes.len().max(other.classes.len());
-        self.classes.resize_with(most, Class::default);
+        self.classes.resize_with(most, SpeedClass::default);
         for (own, other) in self.classes.iter_mut().zip(&other.classes) {
             own.square += other.square;
             let most = own.product.len().max(other.product.len());
@@ -66,13 +68,13 @@ impl BySpeed {
     }
 
     /// The classes that hold rows.
-    pub(super) fn filled(&self) -> impl Iterator<Item = &Class> {
+    pub(super) fn filled(&self) -> impl Iterator<Item = &SpeedClass> {
         self.classes.iter().filter(|class| class.square > 0.0)
     }
 
     /// Mean squares of the residual's level in the classes, beyond what noise of this variance of a row makes of it.
-    pub(super) fn departure(&self, theta: &DVector<f64>, noise: f64) -> Departure {
-        let level = |class: &Class| {
+    pub(super) fn departure(&self, theta: &DVector<f64>, noise: f64) -> FrictionDeparture {
+        let level = |class: &SpeedClass| {
             let each = class.product.iter().zip(theta.iter());
             let fitted: f64 = each.map(|(x, p)| x * p).sum();
             (class.product.last().copied().unwrap_or(0.0) - fitted) / class.square
@@ -99,7 +101,7 @@ impl BySpeed {
             false => 0.0,
         };
         let classes = rows * rows / squares;
-        Departure {
+        FrictionDeparture {
             level: mean(level_sum, rows),
             constant: mean(constant_sum, paired),
             classes: if rows > 0.0 { classes } else { 1.0 },
@@ -109,7 +111,7 @@ impl BySpeed {
 
 /// How far friction departs from its law over the speed, as mean squares \[N^2 or (Nm)^2\].
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Departure {
+pub(super) struct FrictionDeparture {
     /// Of the torque against the motion.
     pub level: f64,
     /// Of what is the same in both directions.
@@ -119,21 +121,21 @@ pub(super) struct Departure {
 }
 
 /// Where a joint's speed and its Coulomb term stand in its row.
-pub(super) struct Place {
+pub(super) struct SpeedColumns {
     pub viscous: usize,
     pub coulomb: usize,
     rest_speed: f64,
 }
 
-impl Place {
-    pub(super) fn of(columns: &RegressorColumns, j: usize) -> Option<Place> {
-        let place = |wanted: Own| {
+impl SpeedColumns {
+    pub(super) fn of(columns: &RegressorColumns, j: usize) -> Option<SpeedColumns> {
+        let place = |wanted: JointTerm| {
             let place = columns.own[j].iter().position(|own| *own == wanted)?;
             Some(columns.shared + place)
         };
-        Some(Place {
-            viscous: place(Own::Viscous)?,
-            coulomb: place(Own::Coulomb)?,
+        Some(SpeedColumns {
+            viscous: place(JointTerm::Viscous)?,
+            coulomb: place(JointTerm::Coulomb)?,
             rest_speed: *columns.rest_speed.get(j).filter(|speed| **speed > 0.0)?,
         })
     }

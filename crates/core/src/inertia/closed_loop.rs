@@ -6,7 +6,7 @@
 //! a natural frequency at critical damping. The step is of first order only: instruments have to move
 //! as the robot does, not to be exact.
 
-use super::columns::{Own, RegressorColumns};
+use super::columns::{JointTerm, RegressorColumns};
 use crate::math::hyperbolic::tanh;
 use crate::robot::Robot;
 use crate::robot::tree::MOST_JOINTS;
@@ -32,7 +32,7 @@ pub struct LoopGains {
 }
 
 /// A matrix of which a corner is used.
-type Square = [[f64; MOST_JOINTS]; MOST_JOINTS];
+type SquareMatrix = [[f64; MOST_JOINTS]; MOST_JOINTS];
 
 /// A robot under the parameters of a fit.
 #[derive(Debug, Clone)]
@@ -90,7 +90,7 @@ impl<'a> ClosedLoop<'a> {
     }
 
     /// Mass matrix and the torque that needs no acceleration, friction aside.
-    fn balance(&self, q: &[f64], v: &[f64]) -> (Square, [f64; MOST_JOINTS]) {
+    fn balance(&self, q: &[f64], v: &[f64]) -> (SquareMatrix, [f64; MOST_JOINTS]) {
         let (n, shared) = (self.columns.joints, &self.theta[..self.columns.shared]);
         let torque = |v: &[f64], a: &[f64]| {
             let mut out = [0.0; MOST_JOINTS];
@@ -121,11 +121,11 @@ impl<'a> ClosedLoop<'a> {
         for (k, own) in self.columns.own[j].iter().enumerate() {
             let size = self.theta[first + k];
             match own {
-                Own::Viscous => {
+                JointTerm::Viscous => {
                     sum[0] += size * v;
                     sum[1] += size;
                 }
-                Own::Coulomb => {
+                JointTerm::Coulomb => {
                     let t = tanh(v / width);
                     sum[0] += size * t;
                     sum[1] += size * (1.0 - t * t) / width;
@@ -147,7 +147,7 @@ impl<'a> ClosedLoop<'a> {
             let inertia = d / (2.0 * self.gains.frequency);
             let own = self.columns.own[j].iter().enumerate();
             let coulomb: f64 = own
-                .filter(|(_, own)| **own == Own::Coulomb)
+                .filter(|(_, own)| **own == JointTerm::Coulomb)
                 .map(|(i, _)| self.theta[self.columns.first_own(j) + i].abs())
                 .sum();
             let width = (2.0 * h * coulomb / inertia).max(1e-9);
@@ -180,7 +180,7 @@ impl<'a> ClosedLoop<'a> {
 }
 
 /// Solves a x = b in place by Cholesky's factor of the symmetric part; false where that is not positive definite.
-fn solve(a: &mut Square, b: &mut [f64; MOST_JOINTS], n: usize) -> bool {
+fn solve(a: &mut SquareMatrix, b: &mut [f64; MOST_JOINTS], n: usize) -> bool {
     for i in 0..n {
         for j in 0..=i {
             let sum: f64 = (0..j).map(|k| a[i][k] * a[j][k]).sum();
@@ -218,7 +218,10 @@ mod tests {
     #[test]
     fn a_joint_follows_its_reference_and_lags_by_what_friction_and_inertia_ask() {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let columns = RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb, Own::Offset], None);
+        let columns = RegressorColumns::of_one(
+            &[JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset],
+            None,
+        );
         let h = 1e-3;
         let theta = vec![95.0, 200.0, 20.0, -3.0];
         let mut joint = ClosedLoop::new(&robot, &columns, theta, &[0.0], 40.0, h);

@@ -10,7 +10,7 @@ use crate::robot::friction::{DoubleTanh, sign};
 
 /// A linear term that belongs to one joint and is fitted with the inertias.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Own {
+pub enum JointTerm {
     /// Fv v.
     Viscous,
     /// Fc sgn(v).
@@ -28,16 +28,16 @@ pub enum Own {
     TorqueBend,
 }
 
-impl Own {
+impl JointTerm {
     /// Name in results and files.
     pub fn name(self) -> &'static str {
         match self {
-            Own::Viscous => "viscous",
-            Own::Coulomb | Own::Saturating(_) => "coulomb",
-            Own::Offset => "offset",
-            Own::Law(k) => DoubleTanh::NAMES[k],
-            Own::TorqueRate => "torque rate",
-            Own::TorqueBend => "torque bend",
+            JointTerm::Viscous => "viscous",
+            JointTerm::Coulomb | JointTerm::Saturating(_) => "coulomb",
+            JointTerm::Offset => "offset",
+            JointTerm::Law(k) => DoubleTanh::NAMES[k],
+            JointTerm::TorqueRate => "torque rate",
+            JointTerm::TorqueBend => "torque bend",
         }
     }
 
@@ -45,11 +45,11 @@ impl Own {
     #[inline]
     pub fn column(self, v: f64) -> f64 {
         match self {
-            Own::Viscous => v,
-            Own::Coulomb => sign(v),
-            Own::Offset => 1.0,
-            Own::Saturating(slope) => tanh(slope * v),
-            Own::Law(_) | Own::TorqueRate | Own::TorqueBend => 0.0,
+            JointTerm::Viscous => v,
+            JointTerm::Coulomb => sign(v),
+            JointTerm::Offset => 1.0,
+            JointTerm::Saturating(slope) => tanh(slope * v),
+            JointTerm::Law(_) | JointTerm::TorqueRate | JointTerm::TorqueBend => 0.0,
         }
     }
 }
@@ -79,7 +79,7 @@ pub struct RegressorColumns {
     /// Number of shared inertial parameters p.
     pub shared: usize,
     /// Own linear terms per joint.
-    pub own: Vec<Vec<Own>>,
+    pub own: Vec<Vec<JointTerm>>,
     /// Known friction per joint; its gradient takes five columns.
     pub known: Vec<Option<KnownFriction>>,
     /// Speed up to which each joint rests [m/s or rad/s]: static friction takes any torque there, and its
@@ -97,7 +97,7 @@ impl RegressorColumns {
         self.rest_speed = speeds;
         for (j, speed) in self.rest_speed.iter_mut().enumerate() {
             let mut own = self.own[j].iter();
-            if self.known[j].is_none() && own.all(|own| *own == Own::Offset) {
+            if self.known[j].is_none() && own.all(|own| *own == JointTerm::Offset) {
                 *speed = -1.0;
             }
         }
@@ -116,11 +116,11 @@ impl RegressorColumns {
 
     /// Whether no weighted row jumps: friction does where samples weigh nothing, and is no steep law.
     pub(super) fn are_smooth(&self) -> bool {
-        let jumps = |(j, own): (usize, &Vec<Own>)| {
+        let jumps = |(j, own): (usize, &Vec<JointTerm>)| {
             let rests = self.rest_speed.get(j).is_some_and(|speed| *speed >= 0.0);
-            let any = |of: &dyn Fn(&Own) -> bool| own.iter().any(of);
-            !rests && any(&|own| *own == Own::Coulomb)
-                || any(&|own| matches!(own, Own::Law(_) | Own::Saturating(_)))
+            let any = |of: &dyn Fn(&JointTerm) -> bool| own.iter().any(of);
+            !rests && any(&|own| *own == JointTerm::Coulomb)
+                || any(&|own| matches!(own, JointTerm::Law(_) | JointTerm::Saturating(_)))
         };
         let laws = self.known.iter().any(Option::is_some);
         !laws && !self.own.iter().enumerate().any(jumps)
@@ -195,15 +195,15 @@ impl RegressorColumns {
         for (own, known) in columns.own.iter_mut().zip(&mut columns.known) {
             if let Some(known) = known.take() {
                 let free = (0..GRADIENT).filter(|k| !known.held[*k]);
-                own.extend(free.map(Own::Law));
+                own.extend(free.map(JointTerm::Law));
             }
         }
         columns
     }
 
     /// Places of each joint's own terms that are to be kept.
-    pub(super) fn places(&self, keep: impl Fn(&Own) -> bool) -> Vec<Vec<usize>> {
-        let kept = |own: &Vec<Own>| (0..own.len()).filter(|k| keep(&own[*k])).collect();
+    pub(super) fn places(&self, keep: impl Fn(&JointTerm) -> bool) -> Vec<Vec<usize>> {
+        let kept = |own: &Vec<JointTerm>| (0..own.len()).filter(|k| keep(&own[*k])).collect();
         self.own.iter().map(kept).collect()
     }
 
@@ -224,7 +224,7 @@ impl RegressorColumns {
         let first = self.first_own(j);
         let own = self.own[j].iter().enumerate();
         own.filter_map(move |(c, own)| match own {
-            Own::Law(k) => Some((first + c, *k)),
+            JointTerm::Law(k) => Some((first + c, *k)),
             _ => None,
         })
     }
@@ -267,7 +267,7 @@ impl RegressorColumns {
     pub fn with_torque_rates(&self) -> RegressorColumns {
         let mut columns = self.clone();
         for own in &mut columns.own {
-            own.extend([Own::TorqueRate, Own::TorqueBend]);
+            own.extend([JointTerm::TorqueRate, JointTerm::TorqueBend]);
         }
         columns
     }
@@ -275,13 +275,13 @@ impl RegressorColumns {
     /// Whether these are columns [`Self::with_torque_rates`].
     pub fn have_torque_rates(&self) -> bool {
         let mut own = self.own.iter();
-        own.any(|own| own.last() == Some(&Own::TorqueBend))
+        own.any(|own| own.last() == Some(&JointTerm::TorqueBend))
     }
 
     /// Fills in what the torques and their rates change over a sample.
     pub(super) fn fill_torque_rates(&self, sample: &MotionSample<'_>, out: &mut [f64]) {
         for (j, own) in self.own.iter().enumerate() {
-            if own.last() == Some(&Own::TorqueBend) {
+            if own.last() == Some(&JointTerm::TorqueBend) {
                 let [before, after] = sample.tau_beside.map(|tau| tau[j]);
                 let end = self.offset(j) + self.unknowns_of(j);
                 out[end - 2] = (after - before) / 2.0;
@@ -317,7 +317,7 @@ impl RegressorColumns {
 #[cfg(test)]
 impl RegressorColumns {
     /// Those of a single joint whose rows always count.
-    pub fn of_one(own: &[Own], known: Option<KnownFriction>) -> Self {
+    pub fn of_one(own: &[JointTerm], known: Option<KnownFriction>) -> Self {
         RegressorColumns {
             joints: 1,
             shared: 1,

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::{BlockFactor, BlockFactors};
-use super::scores::{BlockScore, Scores};
-use super::solve::{Weighting, fit};
+use super::scores::{BlockScore, BlockScores};
+use super::solve::{RowWeighting, fit};
 
 /// Bytes of a value in a text log, with what parts it from the next: six digits, a sign, a point and a comma.
 const TEXT_BYTES: u64 = 10;
@@ -17,7 +17,7 @@ impl BlockFactors {
     /// as text. As many neighbours merge as must, of one stretch or, where stretches are too many, of several. A
     /// log that is too short for a fit of its own is one block.
     pub fn condensed(mut self, samples: u64, others: u64) -> BlockFactors {
-        let Ok(own) = fit(&self, Weighting::Wls) else {
+        let Ok(own) = fit(&self, RowWeighting::Wls) else {
             return self.in_one_block();
         };
         let n = self.columns.joints;
@@ -31,7 +31,7 @@ impl BlockFactors {
         };
         let blocks = self.blocks.iter().map(score).collect();
         let step = Vec::new();
-        let mut scores = Scores { at, step, blocks };
+        let mut scores = BlockScores { at, step, blocks };
         let r: Vec<DMatrix<f64>> = (0..n).map(|j| self.joint(j)).collect();
         let bytes = |factors: &[DMatrix<f64>]| -> u64 {
             let numbers = factors.iter().flat_map(DMatrix::iter);

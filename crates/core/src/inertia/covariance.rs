@@ -14,7 +14,7 @@ use super::solution::{FitInputs, WeightedSolution};
 use crate::math::long_run::long_run;
 
 /// What a fit's unknowns scatter by.
-pub(super) struct Covariances {
+pub(super) struct FitCovariances {
     pub sandwich: DMatrix<f64>,
     /// With what the known friction adds.
     pub total: DMatrix<f64>,
@@ -29,7 +29,7 @@ pub(super) fn covariance(
     solution: &WeightedSolution,
     inputs: FitInputs,
     residual: &[f64],
-) -> Covariances {
+) -> FitCovariances {
     let columns = &factors.columns;
     let weights = inputs.weights;
     let u = columns.unknowns();
@@ -73,7 +73,7 @@ pub(super) fn covariance(
         total += added;
         sensitivity.push(Some(s));
     }
-    Covariances {
+    FitCovariances {
         sandwich,
         total,
         textbook,

@@ -7,8 +7,8 @@
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 use super::accumulate::BlockFactors;
-use super::by_speed::Place;
-use super::columns::Own;
+use super::by_speed::SpeedColumns;
+use super::columns::JointTerm;
 use super::solve::{Fit, weights_of};
 
 /// Ridge of the fit with free levels, over the diagonal: rounding alone.
@@ -22,7 +22,7 @@ pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
     let columns = &sums.columns;
     let correlated = fit.rows as f64 / fit.effective_rows.max(1.0);
     for (j, by_speed) in sums.by_speed.iter().enumerate() {
-        let Some(place) = Place::of(columns, j) else {
+        let Some(place) = SpeedColumns::of(columns, j) else {
             continue;
         };
         let noise = fit.residual_std[j].powi(2) * correlated;
@@ -38,7 +38,10 @@ pub fn widen_by_departure(sums: &BlockFactors, fit: &mut Fit) {
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             fit.covariance[(at[a], at[b])] += of_line[(a, b)];
         }
-        if let Some(offset) = columns.own[j].iter().position(|own| *own == Own::Offset) {
+        if let Some(offset) = columns.own[j]
+            .iter()
+            .position(|own| *own == JointTerm::Offset)
+        {
             let unknown = columns.first_own(j) + offset;
             fit.covariance[(unknown, unknown)] += departure.constant / departure.classes;
         }
@@ -65,7 +68,7 @@ fn change_by_levels(sums: &BlockFactors, fit: &Fit, correlated: f64) -> Option<D
         equations.add(&|c| columns.unknown(j, c), weights[j], &(n, b));
         let spanned = by_speed.filled().next().is_some();
         let of_friction = columns.own[j].iter().enumerate();
-        for (k, _) in of_friction.filter(|(_, own)| spanned && **own != Own::Viscous) {
+        for (k, _) in of_friction.filter(|(_, own)| spanned && **own != JointTerm::Viscous) {
             levels[columns.first_own(j) + k] = true;
         }
     }

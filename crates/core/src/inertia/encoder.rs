@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::accumulate::BlockFactors;
 use super::columns::RegressorColumns;
-use super::robust::Weigher;
+use super::robust::RowWeigher;
 use super::solve::Fit;
 use super::two_pass::two_passes;
 use crate::block::Block;
@@ -29,7 +29,7 @@ pub const GRIDS: u32 = 6;
 pub const NOISY: u32 = 2;
 
 /// The numbers that decide.
-struct Numbers {
+struct DecisionNumbers {
     /// Share of the acceleration's mean square from which noise is looked at: it takes as much off an inertia. Half or
     /// twice: biases of a ten thousandth are seen, or not.
     share: f64,
@@ -38,7 +38,7 @@ struct Numbers {
     unsure: f64,
 }
 
-const NUMBERS: Numbers = Numbers {
+const NUMBERS: DecisionNumbers = DecisionNumbers {
     share: 1e-4,
     unsure: 0.5,
 };
@@ -117,7 +117,7 @@ fn shifts(grid: u32) -> [f64; 4] {
 pub fn accumulate_shifted<E: Send>(
     robot: &Robot,
     columns: &RegressorColumns,
-    weigher: Option<&mut Weigher>,
+    weigher: Option<&mut RowWeigher>,
     settings: &FilterSettings,
     grid: u32,
     source: &mut (dyn FnMut(&mut Block) -> Result<bool, E> + Send),
@@ -179,15 +179,15 @@ pub fn add_scatter(fit: &mut Fit, shifted: &[Fit]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::columns::Own;
-    use super::super::solve::{Weighting, fit};
+    use super::super::columns::JointTerm;
+    use super::super::solve::{RowWeighting, fit};
     use super::*;
 
     const STEP: f64 = 0.004;
 
     /// Fit of an inertia of 0.4 and a friction of 0.7 where positions are rounded and noise comes on top.
     fn fitted(count: f64, noise: Option<PositionNoise>) -> Fit {
-        let columns = RegressorColumns::of_one(&[Own::Viscous], None);
+        let columns = RegressorColumns::of_one(&[JointTerm::Viscous], None);
         let samples = 20_000;
         let at = |k: usize| {
             let t = k as f64 * STEP;
@@ -214,7 +214,7 @@ mod tests {
             let a = (q[k + lag] - 2.0 * q[k] + q[k - lag]) / (h * h);
             [v, a, at(k).1]
         });
-        fit(&columns.rows_of_one(0.2, rows), Weighting::Wls).unwrap()
+        fit(&columns.rows_of_one(0.2, rows), RowWeighting::Wls).unwrap()
     }
 
     #[test]

@@ -20,7 +20,7 @@ const LEVEL: f64 = 0.01;
 
 /// The essential parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Essential {
+pub struct EssentialParameters {
     /// Per unknown.
     pub essential: Vec<bool>,
     /// Fit of the essential ones alone; the others are 0.
@@ -32,7 +32,11 @@ pub struct Essential {
 ///
 /// # Errors
 /// [`FitError::NothingExcited`] where no column is.
-pub fn essential(factor: &DMatrix<f64>, rows: f64, effective: f64) -> Result<Essential, FitError> {
+pub fn essential(
+    factor: &DMatrix<f64>,
+    rows: f64,
+    effective: f64,
+) -> Result<EssentialParameters, FitError> {
     let u = factor.ncols() - 1;
     // of columns that depend on one another the first stay
     let all: Vec<usize> = (0..u).collect();
@@ -54,14 +58,14 @@ pub fn essential(factor: &DMatrix<f64>, rows: f64, effective: f64) -> Result<Ess
         };
         let (worst, largest) = fit.extreme(|a, b| a > b);
         let (_, smallest) = fit.extreme(|a, b| a < b);
-        let stays = |fit: &Solved| {
+        let stays = |fit: &TrialSolution| {
             let mut theta = DVector::zeros(u);
             let mut essential = vec![false; u];
             for (k, c) in kept.iter().enumerate() {
                 theta[*c] = fit.theta[k];
                 essential[*c] = true;
             }
-            Essential { essential, theta }
+            EssentialParameters { essential, theta }
         };
         if kept.len() == 1 || largest < RATIO * smallest {
             return Ok(stays(&fit));
@@ -84,7 +88,8 @@ struct ReducedFactor {
     square: f64,
 }
 
-struct Solved {
+/// Parameters of one set of kept columns, with how uncertain they are.
+struct TrialSolution {
     theta: DVector<f64>,
     /// Relative standard deviation up to a factor that all share.
     relative: Vec<f64>,
@@ -101,7 +106,7 @@ impl ReducedFactor {
     }
 
     /// `None` without a column.
-    fn solved(&self) -> Option<Solved> {
+    fn solved(&self) -> Option<TrialSolution> {
         let k = self.r.ncols() - 1;
         if k == 0 {
             return None;
@@ -112,11 +117,11 @@ impl ReducedFactor {
         let inverse = square.solve_upper_triangular(&DMatrix::identity(k, k))?;
         let relative = |i: usize| inverse.row(i).norm() / theta[i].abs();
         let relative = (0..k).map(relative).collect();
-        Some(Solved { theta, relative })
+        Some(TrialSolution { theta, relative })
     }
 }
 
-impl Solved {
+impl TrialSolution {
     fn extreme(&self, beyond: impl Fn(f64, f64) -> bool) -> (usize, f64) {
         let mut best = (0, self.relative[0]);
         for (i, r) in self.relative.iter().enumerate() {

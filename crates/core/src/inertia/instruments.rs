@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::BLOCK_SECONDS;
-use super::accumulate::{Accumulator, BlockFactor, BlockFactors};
+use super::accumulate::{BlockFactor, BlockFactors, RowAccumulator};
 use super::closed_loop::{ClosedLoop, LoopGains};
 use super::columns::{GRADIENT, RegressorColumns};
 use super::covariance::{at_least, bandwidth, by_friction};
@@ -23,7 +23,7 @@ use super::solution::FitError;
 use super::solve::{Fit, weights_of};
 use super::two_pass::two_passes;
 use crate::block::Block;
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 use crate::math::long_run::long_run;
 use crate::math::rank;
 use crate::motion::{self, FilterSettings, ParallelFilter, RunError, Summary};
@@ -97,7 +97,7 @@ pub fn accumulate<E: Send>(
         ..settings.clone()
     };
     let from = width - n;
-    let mut simulation = Simulation {
+    let mut simulation = LoopSimulation {
         run: None,
         begin: |q_ref: &[f64]| {
             let theta = theta.as_slice().to_vec();
@@ -105,7 +105,7 @@ pub fn accumulate<E: Send>(
         },
         steps: 0,
     };
-    let mut factors = Accumulator::new(wide.clone(), BLOCK_SECONDS);
+    let mut factors = RowAccumulator::new(wide.clone(), BLOCK_SECONDS);
     let (_, summary) = two_passes(
         |outlet| {
             motion::run(
@@ -157,7 +157,7 @@ pub fn accumulate<E: Send>(
 }
 
 /// The loop along the reference of a log, row by row.
-struct Simulation<'a, B> {
+struct LoopSimulation<'a, B> {
     /// The loop, its segment of the log, and the time of its last row [s].
     run: Option<(ClosedLoop<'a>, usize, f64)>,
     /// Begins it at a pose.
@@ -165,7 +165,7 @@ struct Simulation<'a, B> {
     steps: u64,
 }
 
-impl<'a, B: Fn(&[f64]) -> ClosedLoop<'a>> Simulation<'a, B> {
+impl<'a, B: Fn(&[f64]) -> ClosedLoop<'a>> LoopSimulation<'a, B> {
     /// Appends the simulated positions of a row, whose channels are reference and its velocity.
     fn row(&mut self, row: &motion::FilteredRow<'_>, n: usize, out: &mut Vec<f64>) {
         let (q_ref, v_ref) = (&row.filtered[..n], &row.filtered[n..2 * n]);
@@ -342,9 +342,9 @@ pub fn again(
 
 /// A fit with instruments.
 #[derive(Debug, Clone)]
-pub struct Instrumental {
+pub struct InstrumentalFit {
     pub fit: Fit,
-    pub ending: Ending,
+    pub ending: IterationEnding,
     /// Simulations.
     pub iterations: usize,
 }
@@ -358,10 +358,10 @@ pub fn iterate<E: From<FitError>>(
     columns: &RegressorColumns,
     plain: &Fit,
     pass: &mut dyn FnMut(&DVector<f64>) -> Result<BlockFactors, E>,
-) -> Result<Instrumental, E> {
+) -> Result<InstrumentalFit, E> {
     let (mut fit, mut iterations) = (plain.clone(), 0);
-    let mut ending = Ending::IterationLimit;
-    while iterations < MAX_ITERATIONS && ending == Ending::IterationLimit {
+    let mut ending = IterationEnding::IterationLimit;
+    while iterations < MAX_ITERATIONS && ending == IterationEnding::IterationLimit {
         let next = again(columns, &fit, &pass(&fit.theta)?)?;
         iterations += 1;
         let moved = |i: usize| {
@@ -369,11 +369,11 @@ pub fn iterate<E: From<FitError>>(
             next.determined[i] && (next.theta[i] - fit.theta[i]).abs() > SETTLED * std
         };
         if !(0..next.theta.len()).any(moved) {
-            ending = Ending::Converged;
+            ending = IterationEnding::Converged;
         }
         fit = next;
     }
-    Ok(Instrumental {
+    Ok(InstrumentalFit {
         fit,
         ending,
         iterations,

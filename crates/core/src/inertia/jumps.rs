@@ -6,9 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::{BlockFactor, BlockFactors};
-use super::columns::Own;
+use super::columns::JointTerm;
 use super::solution::FitError;
-use super::solve::{Fit, Weighting, fit};
+use super::solve::{Fit, RowWeighting, fit};
 
 /// Numbers that decide what a jump is.
 struct Limits {
@@ -34,7 +34,7 @@ const LIMITS: Limits = Limits {
 
 /// A stretch in which residuals jump.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Jump {
+pub struct ResidualJump {
     /// First and last time, as its rows have them \[s\].
     pub span: [f64; 2],
     /// Joints, and how many times the usual residual each of them has there.
@@ -45,7 +45,7 @@ pub struct Jump {
 ///
 /// # Errors
 /// [`FitError`].
-pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
+pub fn jumps(factors: &BlockFactors) -> Result<Vec<ResidualJump>, FitError> {
     let usable = |b: &&BlockFactor| b.span[1] > b.span[0] && b.scores.is_none();
     let blocks: Vec<&BlockFactor> = factors.blocks.iter().filter(usable).collect();
     if factors.columns.joints < 2 || blocks.len() < LIMITS.blocks {
@@ -59,7 +59,7 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
             blocks: std::mem::take(&mut kept),
             ..factors.without_blocks()
         };
-        let found = fit(&part, Weighting::Wls)?;
+        let found = fit(&part, RowWeighting::Wls)?;
         (ratios, usual) = over_usual(factors, &blocks, &found);
         theta = found.theta;
         if round == LIMITS.rounds {
@@ -89,7 +89,7 @@ const BY_FRICTION: f64 = 2.0;
 /// Coulomb level of a joint by a fit; 0 where it is not fitted.
 fn coulomb(factors: &BlockFactors, theta: &DVector<f64>, j: usize) -> f64 {
     let mut own = factors.columns.own[j].iter();
-    let at = own.position(|own| *own == Own::Coulomb);
+    let at = own.position(|own| *own == JointTerm::Coulomb);
     at.map_or(0.0, |at| theta[factors.columns.first_own(j) + at].abs())
 }
 
@@ -138,8 +138,8 @@ fn over_usual(
 }
 
 /// Blocks that jump, those next to each other as one.
-fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<Jump> {
-    let mut found: Vec<Jump> = Vec::new();
+fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<ResidualJump> {
+    let mut found: Vec<ResidualJump> = Vec::new();
     for (block, ratios) in blocks.iter().zip(ratios) {
         let joints = ratios.iter().copied().enumerate();
         let joints: Vec<(usize, f64)> = joints.filter(|(_, r)| *r > LIMITS.times).collect();
@@ -157,7 +157,7 @@ fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<Jump> {
                     }
                 }
             }
-            _ => found.push(Jump {
+            _ => found.push(ResidualJump {
                 span: block.span,
                 joints,
             }),
@@ -173,13 +173,13 @@ fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<Jump> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inertia::accumulate::Accumulator;
+    use crate::inertia::accumulate::RowAccumulator;
     use crate::inertia::columns::RegressorColumns;
     use crate::robot::tree::{Coordinate, Link, Tree, space};
     use crate::robot::{JointKind, Robot};
 
     /// Two prismatic joints across each other for 20 s, pushed from 8 to 10 s by a force on both or on one.
-    fn pushed(force: [f64; 2]) -> Vec<Jump> {
+    fn pushed(force: [f64; 2]) -> Vec<ResidualJump> {
         let link = |axis: [f64; 3], joint: usize| Link {
             name: format!("link_{joint}"),
             parent: joint.checked_sub(1),
@@ -195,11 +195,11 @@ mod tests {
         let columns = RegressorColumns {
             joints: 2,
             shared: robot.parameters().len(),
-            own: vec![vec![Own::Viscous, Own::Coulomb]; 2],
+            own: vec![vec![JointTerm::Viscous, JointTerm::Coulomb]; 2],
             known: vec![None, None],
             rest_speed: Vec::new(),
         };
-        let mut rows = Accumulator::new(columns.clone(), 0.05);
+        let mut rows = RowAccumulator::new(columns.clone(), 0.05);
         let mut out = vec![0.0; columns.channels()];
         for k in 0..2000 {
             let t = 0.01 * f64::from(k);

@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
-use super::columns::Own;
+use super::columns::JointTerm;
 use super::departure::{NormalEquations, inverse_scaled};
 use super::solve::{Fit, weights_of};
 
@@ -25,7 +25,7 @@ const SOFT_HZ: f64 = 20.0;
 
 /// The rows of columns [`with_torque_rates`](super::columns::RegressorColumns::with_torque_rates) without the rates.
 pub fn without_rates(sums: &BlockFactors) -> BlockFactors {
-    let own = |own: &Own| !matches!(own, Own::TorqueRate | Own::TorqueBend);
+    let own = |own: &JointTerm| !matches!(own, JointTerm::TorqueRate | JointTerm::TorqueBend);
     sums.with_own(&sums.columns.places(own))
 }
 
@@ -83,9 +83,9 @@ pub fn widen_by_delay(sums: &BlockFactors, step: f64, fit: &mut Fit) -> Option<(
 
 #[cfg(test)]
 mod tests {
-    use super::super::accumulate::Accumulator;
+    use super::super::accumulate::RowAccumulator;
     use super::super::columns::RegressorColumns;
-    use super::super::solve::{Weighting, fit};
+    use super::super::solve::{RowWeighting, fit};
     use super::*;
 
     const STEP: f64 = 0.01;
@@ -96,7 +96,7 @@ mod tests {
     /// Error of a joint's inertia in deviations, before and after; and the deviation over that of an unseen delay. The
     /// torque is logged `late` samples late, and the drive gives way by `soft` samples squared.
     fn errors(truth: [f64; 2], late: f64, soft: f64) -> [f64; 3] {
-        let columns = RegressorColumns::of_one(&[Own::Viscous], None);
+        let columns = RegressorColumns::of_one(&[JointTerm::Viscous], None);
         let rates = columns.with_torque_rates();
         // speed, and what it changes over time again and again
         let motion = |t: f64| -> [f64; 4] {
@@ -114,8 +114,8 @@ mod tests {
             let [v, a, ..] = motion((k - late) * STEP);
             truth[0] * a + truth[1] * v + 0.005 * (k * k * 0.7).sin()
         };
-        let mut plain = Accumulator::new(columns, 0.1);
-        let mut with = Accumulator::new(rates, 0.1);
+        let mut plain = RowAccumulator::new(columns, 0.1);
+        let mut with = RowAccumulator::new(rates, 0.1);
         for k in 0..4000 {
             let k = f64::from(k);
             let [v, a, slope, bend] = motion(k * STEP);
@@ -131,8 +131,8 @@ mod tests {
             with.add(0, STEP, &[a, v, rate, bend, torque(k), torque(k)]);
         }
         let with = with.finish();
-        let mut found = fit(&plain.finish(), Weighting::Wls).unwrap();
-        let same = fit(&without_rates(&with), Weighting::Wls).unwrap();
+        let mut found = fit(&plain.finish(), RowWeighting::Wls).unwrap();
+        let same = fit(&without_rates(&with), RowWeighting::Wls).unwrap();
         assert!((&same.theta - &found.theta).amax() < 1e-12);
         let error = |fit: &Fit| (fit.theta[0] - truth[0]) / fit.covariance[(0, 0)].sqrt();
         let before = error(&found);

@@ -2,9 +2,9 @@
 //! slopes w_k, of which every joint takes the two that explain most.
 
 use super::accumulate::BlockFactors;
-use super::columns::{GRADIENT, KnownFriction, Own, RegressorColumns};
+use super::columns::{GRADIENT, JointTerm, KnownFriction, RegressorColumns};
 use super::solution::{FitError, FitInputs};
-use super::solve::{Fit, Weighting, fit, fit_with, least_square, weights_of};
+use super::solve::{Fit, RowWeighting, fit, fit_with, least_square, weights_of};
 use crate::robot::friction::DoubleTanh;
 
 /// Slopes of the columns that begin a law, times the joint's rms speed.
@@ -19,7 +19,7 @@ pub fn begin<E: From<FitError>>(
     linear: &RegressorColumns,
     pass: &mut dyn FnMut(&RegressorColumns) -> Result<BlockFactors, E>,
 ) -> Result<RegressorColumns, E> {
-    let plain = fit(&pass(linear)?, Weighting::Wls)?;
+    let plain = fit(&pass(linear)?, RowWeighting::Wls)?;
     let ladder = SlopeLadder::of(linear, &plain);
     let factors = pass(&ladder.columns)?;
     let weights = weights_of(&factors, &plain.residual_std);
@@ -31,8 +31,8 @@ pub fn begin<E: From<FitError>>(
 }
 
 /// Place of viscous friction among a joint's own terms.
-fn viscous(own: &[Own]) -> Option<usize> {
-    own.iter().position(|o| *o == Own::Viscous)
+fn viscous(own: &[JointTerm]) -> Option<usize> {
+    own.iter().position(|o| *o == JointTerm::Viscous)
 }
 
 /// Columns of tanh(w_k v) for all slopes, of every joint with viscous friction.
@@ -54,8 +54,8 @@ impl<'a> SlopeLadder<'a> {
             let speed = plain.column_rms[(j, linear.first_own(j) + k)];
             let unit = if speed > 0.0 { 1.0 / speed } else { 1.0 };
             *slopes = SLOPES.map(|s| s * unit);
-            columns.own[j].retain(|o| *o != Own::Coulomb);
-            columns.own[j].extend(slopes.map(Own::Saturating));
+            columns.own[j].retain(|o| *o != JointTerm::Coulomb);
+            columns.own[j].extend(slopes.map(JointTerm::Saturating));
         }
         SlopeLadder {
             linear,
@@ -66,7 +66,8 @@ impl<'a> SlopeLadder<'a> {
 
     /// Places of each joint's own terms beside the ladder.
     fn base(&self) -> Vec<Vec<usize>> {
-        self.columns.places(|o| !matches!(o, Own::Saturating(_)))
+        self.columns
+            .places(|o| !matches!(o, JointTerm::Saturating(_)))
     }
 
     /// The same with a pair of slopes on each joint.
@@ -122,7 +123,7 @@ impl<'a> SlopeLadder<'a> {
             let last = chosen.columns.own[j].len();
             let [steep, flat] = pair.map(|k| self.slopes[j][k]);
             let place = self.base()[j].iter().position(|b| *b == k);
-            start.own[j].retain(|o| !matches!(o, Own::Viscous | Own::Coulomb));
+            start.own[j].retain(|o| !matches!(o, JointTerm::Viscous | JointTerm::Coulomb));
             start.known[j] = Some(KnownFriction {
                 law: DoubleTanh::from_parameters([
                     at(place.unwrap_or_default()),

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::accumulate::{self, BlockFactor, BlockFactors};
-use super::feasible::{ConsistencyProblem, Feasible, feasible};
+use super::feasible::{ConsistencyProblem, FeasibleParameters, feasible};
 use super::solution::{FitError, joints, solve, stacked};
 use crate::judge::{NUMBERS, compare};
 
@@ -92,7 +92,7 @@ fn both(
     let u = plain.len();
     let towards = rows.columns(0, u) * &plain;
     rows.set_column(u, &towards);
-    let Feasible { theta, .. } = feasible(&ConsistencyProblem {
+    let FeasibleParameters { theta, .. } = feasible(&ConsistencyProblem {
         factor: &rows,
         ..*task
     })?;

@@ -37,9 +37,9 @@ use crate::block::Block;
 use crate::motion::{self, FilterSettings, RunError, Summary};
 use crate::robot::Robot;
 
-use accumulate::{Accumulator, BlockFactors};
+use accumulate::{BlockFactors, RowAccumulator};
 use columns::RegressorColumns;
-use robust::Weigher;
+use robust::RowWeigher;
 
 /// Length of the blocks whose scores make the covariance, to begin with [s]: short beside their correlation.
 const BLOCK_SECONDS: f64 = 0.05;
@@ -64,11 +64,11 @@ pub fn accumulate<E>(
 pub fn accumulate_weighted<E>(
     robot: &Robot,
     columns: &RegressorColumns,
-    mut weigher: Option<&mut Weigher>,
+    mut weigher: Option<&mut RowWeigher>,
     settings: &FilterSettings,
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
 ) -> Result<(BlockFactors, Summary), RunError<E>> {
-    let mut factors = Accumulator::new(columns.clone(), BLOCK_SECONDS);
+    let mut factors = RowAccumulator::new(columns.clone(), BLOCK_SECONDS);
     let settings = FilterSettings {
         thin: settings.weighs_rests && columns.are_smooth(),
         ..columns.with_rests(settings)

@@ -10,10 +10,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::{BlockFactors, RelativeResidual};
-use super::columns::{GRADIENT, Own, RegressorColumns};
+use super::columns::{GRADIENT, JointTerm, RegressorColumns};
 use super::solution::{FitError, FitInputs, PriorRows};
-use super::solve::{Fit, Weighting, fit, fit_with, least_square, weights_of};
-use crate::math::descent::{Ending, StepControl, Trial, descend};
+use super::solve::{Fit, RowWeighting, fit, fit_with, least_square, weights_of};
+use crate::math::descent::{IterationEnding, StepControl, Trial, descend};
 use crate::math::rank;
 use crate::robot::friction::DoubleTanh;
 
@@ -35,7 +35,7 @@ pub struct RefinedFit {
     pub columns: RegressorColumns,
     /// All unknowns in the order of [`RegressorColumns::with_free_friction`].
     pub fit: Fit,
-    pub ending: Ending,
+    pub ending: IterationEnding,
     /// Passes over the logs.
     pub iterations: usize,
     /// Relative residual per joint before the refinement.
@@ -65,7 +65,7 @@ impl RefinedFit {
     /// [`FitError`].
     pub fn without_laws(&self) -> Result<(Fit, BlockFactors), FitError> {
         let rows = without_law(&self.factors);
-        Ok((fit(&rows, Weighting::Wls)?, rows.in_one_block()))
+        Ok((fit(&rows, RowWeighting::Wls)?, rows.in_one_block()))
     }
 
     /// What the unknowns of [`Self::factors`] lack to those of [`Self::fit`]: the laws as they stand.
@@ -135,7 +135,7 @@ fn damped(
     for (j, own) in factors.columns.own.iter().enumerate() {
         let r = factors.joint(j);
         let of_law = own.iter().enumerate();
-        for (k, _) in of_law.filter(|(_, own)| matches!(own, Own::Law(_))) {
+        for (k, _) in of_law.filter(|(_, own)| matches!(own, JointTerm::Law(_))) {
             let size = weights[j] * r.column(factors.columns.shared + k).norm();
             let at = rows.nrows();
             rows = rows.insert_row(at, 0.0);
@@ -150,7 +150,7 @@ fn damped(
 
 /// The rows without the terms of laws.
 fn without_law(factors: &BlockFactors) -> BlockFactors {
-    let linear = |own: &Own| !matches!(own, Own::Law(_));
+    let linear = |own: &JointTerm| !matches!(own, JointTerm::Law(_));
     factors.with_own(&factors.columns.places(linear))
 }
 
@@ -226,13 +226,13 @@ impl DescentPoint {
 
 /// The fit of all but the laws.
 fn linear_fit(factors: &BlockFactors) -> Result<Fit, FitError> {
-    fit(&without_law(factors), Weighting::Wls)
+    fit(&without_law(factors), RowWeighting::Wls)
 }
 
 /// Rms speed of each joint that has a law; 0 of the others.
 fn speeds(factors: &BlockFactors) -> Vec<f64> {
-    let place = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Law(0));
-    let speed = |(j, own): (usize, &Vec<Own>)| match place(own) {
+    let place = |own: &Vec<JointTerm>| own.iter().position(|o| *o == JointTerm::Law(0));
+    let speed = |(j, own): (usize, &Vec<JointTerm>)| match place(own) {
         Some(k) => {
             let column = factors.columns.shared + k;
             factors.joint(j).column(column).norm() / (factors.moving[j].count.max(1) as f64).sqrt()
@@ -345,7 +345,10 @@ mod tests {
     const TRUTH: [f64; 7] = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
 
     fn linear() -> RegressorColumns {
-        RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb, Own::Offset], None)
+        RegressorColumns::of_one(
+            &[JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset],
+            None,
+        )
     }
 
     /// Rows of a joint with inertia and law, of which every speed is seen often.
@@ -388,7 +391,7 @@ mod tests {
         };
         let start = begin(&linear(), &mut pass).unwrap();
         let found = refine(start, &mut pass).unwrap();
-        assert_eq!(found.ending, Ending::Converged);
+        assert_eq!(found.ending, IterationEnding::Converged);
         for (i, truth) in TRUTH.into_iter().enumerate() {
             let off = (found.fit.theta[i] / truth - 1.0).abs();
             assert!(off < 1e-6, "unknown {i}: {} {truth}", found.fit.theta[i]);
@@ -426,7 +429,7 @@ mod tests {
                 covariance,
                 held: [false; GRADIENT],
             };
-            let known = RegressorColumns::of_one(&[Own::Offset], Some(known));
+            let known = RegressorColumns::of_one(&[JointTerm::Offset], Some(known));
             let found = refine(known, &mut |c: &RegressorColumns| read(c, 0.02, 5)).unwrap();
             let viscous = found.fit.theta[2];
             let near = if stays { off[0] } else { LAW[0] };

@@ -12,8 +12,8 @@ use nalgebra::DVector;
 use super::accumulate::BlockFactors;
 use super::columns::RegressorColumns;
 use super::solution::{FitError, FitInputs};
-use super::solve::{Fit, Weighting, fit, fit_with};
-use crate::math::descent::Ending;
+use super::solve::{Fit, RowWeighting, fit, fit_with};
+use crate::math::descent::IterationEnding;
 
 /// Tuning of Huber's loss: 95 % efficiency where residuals are normal.
 const HUBER: f64 = 1.345;
@@ -35,7 +35,7 @@ const LOWEST: f64 = 1e-6;
 
 /// How a residual of u scales counts.
 #[derive(Debug, Clone, Copy)]
-enum Loss {
+enum RobustLoss {
     /// All rows alike.
     Square,
     /// Huber 1964: square within 1.345 scales, linear beyond.
@@ -44,14 +44,14 @@ enum Loss {
     Bisquare,
 }
 
-impl Loss {
+impl RobustLoss {
     /// psi(u)/u, the weight of a row.
     fn weight(self, u: f64) -> f64 {
         match self {
-            Loss::Square => 1.0,
-            Loss::Huber if u.abs() <= HUBER => 1.0,
-            Loss::Huber => HUBER / u.abs(),
-            Loss::Bisquare => {
+            RobustLoss::Square => 1.0,
+            RobustLoss::Huber if u.abs() <= HUBER => 1.0,
+            RobustLoss::Huber => HUBER / u.abs(),
+            RobustLoss::Bisquare => {
                 let rest = 1.0 - (u / BISQUARE).powi(2);
                 if rest > 0.0 { rest * rest } else { 0.0 }
             }
@@ -61,9 +61,9 @@ impl Loss {
     /// psi'(u).
     fn slope(self, u: f64) -> f64 {
         match self {
-            Loss::Square => 1.0,
-            Loss::Huber => f64::from(u8::from(u.abs() <= HUBER)),
-            Loss::Bisquare => match (u / BISQUARE).powi(2) {
+            RobustLoss::Square => 1.0,
+            RobustLoss::Huber => f64::from(u8::from(u.abs() <= HUBER)),
+            RobustLoss::Bisquare => match (u / BISQUARE).powi(2) {
                 x if x < 1.0 => (1.0 - x) * (1.0 - 5.0 * x),
                 _ => 0.0,
             },
@@ -73,7 +73,7 @@ impl Loss {
 
 /// Counts of absolute residuals of one joint, and what their weights sum up to.
 #[derive(Debug, Clone, Default)]
-struct Tally {
+struct ResidualTally {
     /// Residual of the first bin's upper edge [N or Nm].
     lowest: f64,
     bins: Vec<u64>,
@@ -85,12 +85,12 @@ struct Tally {
     square: f64,
 }
 
-impl Tally {
+impl ResidualTally {
     fn new(rms: f64) -> Self {
-        Tally {
+        ResidualTally {
             lowest: LOWEST * rms,
             bins: vec![0; BINS],
-            ..Tally::default()
+            ..ResidualTally::default()
         }
     }
 
@@ -129,23 +129,23 @@ impl Tally {
 
 /// Weighs rows by their residuals under a fit, and counts what it sees.
 #[derive(Debug, Clone)]
-pub struct Weigher {
-    loss: Loss,
+pub struct RowWeigher {
+    loss: RobustLoss,
     theta: DVector<f64>,
     /// Per joint [N or Nm].
     scale: Vec<f64>,
-    tally: Vec<Tally>,
+    tally: Vec<ResidualTally>,
     row: Vec<f64>,
 }
 
-impl Weigher {
+impl RowWeigher {
     /// Weights by the residuals of `theta`, in `scale` per joint; `rms` is about the size of a joint's residuals.
-    fn new(loss: Loss, theta: DVector<f64>, scale: Vec<f64>, rms: &[f64]) -> Self {
-        Weigher {
+    fn new(loss: RobustLoss, theta: DVector<f64>, scale: Vec<f64>, rms: &[f64]) -> Self {
+        RowWeigher {
             loss,
             theta,
             scale,
-            tally: rms.iter().map(|rms| Tally::new(*rms)).collect(),
+            tally: rms.iter().map(|rms| ResidualTally::new(*rms)).collect(),
             row: Vec::new(),
         }
     }
@@ -155,7 +155,7 @@ impl Weigher {
     pub fn afresh(&self) -> Self {
         let mut new = self.clone();
         for tally in &mut new.tally {
-            *tally = Tally::new(tally.lowest / LOWEST);
+            *tally = ResidualTally::new(tally.lowest / LOWEST);
         }
         new
     }
@@ -191,7 +191,7 @@ impl Weigher {
 
     /// Scale of each joint's residuals, not below `floor` [N or Nm].
     fn scales(&self, floor: &[f64]) -> Vec<f64> {
-        let scale = |(t, f): (&Tally, &f64)| (NORMAL * t.median()).max(*f);
+        let scale = |(t, f): (&ResidualTally, &f64)| (NORMAL * t.median()).max(*f);
         self.tally.iter().zip(floor).map(scale).collect()
     }
 
@@ -202,7 +202,7 @@ impl Weigher {
     pub fn solve(&self, factors: &BlockFactors) -> Result<Fit, FitError> {
         let inverse = |s: &f64| if *s > 0.0 { 1.0 / s } else { 0.0 };
         let weights: Vec<f64> = self.scale.iter().map(inverse).collect();
-        let share = |t: &Tally| match t.weight > 0.0 {
+        let share = |t: &ResidualTally| match t.weight > 0.0 {
             true => (t.slope / t.weight).max(LEAST_SLOPE),
             false => 1.0,
         };
@@ -228,13 +228,13 @@ const LEAST_SLOPE: f64 = 0.1;
 
 /// A robust fit.
 #[derive(Debug, Clone)]
-pub struct Robust {
+pub struct RobustFit {
     pub fit: Fit,
     /// The weighted rows of the last pass.
     pub factors: BlockFactors,
     /// Gives other readings of the logs the weights of the fit.
-    pub weigher: Weigher,
-    pub ending: Ending,
+    pub weigher: RowWeigher,
+    pub ending: IterationEnding,
     /// Passes over the logs with weights.
     pub iterations: usize,
     /// Scale of each joint's residuals [N or Nm].
@@ -248,21 +248,21 @@ pub struct Robust {
 /// # Errors
 /// Those of `pass`, and [`FitError`].
 pub fn irls<E: From<FitError>>(
-    pass: &mut dyn FnMut(Option<&mut Weigher>) -> Result<BlockFactors, E>,
-) -> Result<Robust, E> {
-    let mut fit = fit(&pass(None)?, Weighting::Wls)?;
+    pass: &mut dyn FnMut(Option<&mut RowWeigher>) -> Result<BlockFactors, E>,
+) -> Result<RobustFit, E> {
+    let mut fit = fit(&pass(None)?, RowWeighting::Wls)?;
     let rms: Vec<f64> = fit.residual_std.clone();
     let floor: Vec<f64> = fit.torque_rms.iter().map(|rms| 1e-9 * rms).collect();
-    let mut seen = Weigher::new(Loss::Square, fit.theta.clone(), rms.clone(), &rms);
+    let mut seen = RowWeigher::new(RobustLoss::Square, fit.theta.clone(), rms.clone(), &rms);
     pass(Some(&mut seen))?;
     let mut scale = seen.scales(&floor);
     let mut iterations = 1;
-    let mut ending = Ending::IterationLimit;
+    let mut ending = IterationEnding::IterationLimit;
     let mut last = None;
-    for loss in [Loss::Huber, Loss::Bisquare] {
-        ending = Ending::IterationLimit;
+    for loss in [RobustLoss::Huber, RobustLoss::Bisquare] {
+        ending = IterationEnding::IterationLimit;
         for _ in 0..MAX_ITERATIONS {
-            seen = Weigher::new(loss, fit.theta.clone(), scale, &rms);
+            seen = RowWeigher::new(loss, fit.theta.clone(), scale, &rms);
             let factors = pass(Some(&mut seen))?;
             let next = seen.solve(&factors)?;
             iterations += 1;
@@ -276,14 +276,14 @@ pub fn irls<E: From<FitError>>(
             fit = next;
             last = Some(factors);
             if settled {
-                ending = Ending::Converged;
+                ending = IterationEnding::Converged;
                 break;
             }
         }
     }
-    let share = |t: &Tally| t.down as f64 / t.rows.max(1) as f64;
+    let share = |t: &ResidualTally| t.down as f64 / t.rows.max(1) as f64;
     let factors = last.ok_or(FitError::NothingExcited)?;
-    Ok(Robust {
+    Ok(RobustFit {
         factors,
         down_weighted: seen.tally.iter().map(share).collect(),
         scale: seen.scale.clone(),
@@ -297,8 +297,8 @@ pub fn irls<E: From<FitError>>(
 #[cfg(test)]
 mod tests {
     use super::super::BLOCK_SECONDS;
-    use super::super::accumulate::Accumulator;
-    use super::super::columns::Own;
+    use super::super::accumulate::RowAccumulator;
+    use super::super::columns::JointTerm;
     use super::*;
     use crate::robot::{JointKind, Robot};
     use rand::{RngExt, SeedableRng};
@@ -310,13 +310,13 @@ mod tests {
     fn read(
         hit: f64,
         seed: u64,
-        mut weigher: Option<&mut Weigher>,
+        mut weigher: Option<&mut RowWeigher>,
     ) -> Result<BlockFactors, FitError> {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let columns = RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb], None);
+        let columns = RegressorColumns::of_one(&[JointTerm::Viscous, JointTerm::Coulomb], None);
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
-        let mut all = Accumulator::new(columns.clone(), BLOCK_SECONDS);
+        let mut all = RowAccumulator::new(columns.clone(), BLOCK_SECONDS);
         let mut channels = vec![0.0; columns.channels()];
         let mut pick = ChaCha8Rng::seed_from_u64(seed + 1000);
         for k in 0..4000 {
@@ -337,10 +337,10 @@ mod tests {
 
     #[test]
     fn two_per_cent_of_spikes_ruin_least_squares_and_not_the_robust_fit() {
-        let plain = fit(&read(0.02, 3, None).unwrap(), Weighting::Wls).unwrap();
+        let plain = fit(&read(0.02, 3, None).unwrap(), RowWeighting::Wls).unwrap();
         assert!((plain.theta[2] - 0.7).abs() > 0.4, "{}", plain.theta);
         let robust = irls(&mut |w| read(0.02, 3, w)).unwrap();
-        assert_eq!(robust.ending, Ending::Converged);
+        assert_eq!(robust.ending, IterationEnding::Converged);
         for (i, truth) in TRUTH.into_iter().enumerate() {
             let std = robust.fit.covariance[(i, i)].sqrt();
             let off = (robust.fit.theta[i] - truth).abs();
@@ -359,7 +359,7 @@ mod tests {
     fn on_clean_rows_both_agree_and_the_robust_intervals_cover() {
         let mut covered = [0; 3];
         for seed in 0..100 {
-            let plain = fit(&read(0.0, seed, None).unwrap(), Weighting::Wls).unwrap();
+            let plain = fit(&read(0.0, seed, None).unwrap(), RowWeighting::Wls).unwrap();
             let robust = irls(&mut |w| read(0.0, seed, w)).unwrap();
             for (i, truth) in TRUTH.into_iter().enumerate() {
                 let [std, of_plain] =
@@ -376,7 +376,7 @@ mod tests {
 
     #[test]
     fn slopes_of_the_losses_are_their_derivatives() {
-        for loss in [Loss::Square, Loss::Huber, Loss::Bisquare] {
+        for loss in [RobustLoss::Square, RobustLoss::Huber, RobustLoss::Bisquare] {
             for u in [-5.0, -3.1, -1.0, 0.3, 1.2, 2.0, 4.5] {
                 let psi = |u: f64| u * loss.weight(u);
                 let difference = (psi(u + 1e-5) - psi(u - 1e-5)) / 2e-5;
@@ -387,7 +387,7 @@ mod tests {
 
     #[test]
     fn the_histogram_s_median_is_the_sorted_one() {
-        let mut tally = Tally::new(1.0);
+        let mut tally = ResidualTally::new(1.0);
         let mut chance = ChaCha8Rng::seed_from_u64(4);
         let mut draw = || chance.random::<f64>().powi(3) * 7.0;
         let mut all: Vec<f64> = (0..5001).map(|_| draw()).collect();

@@ -26,7 +26,7 @@ pub struct BlockScore {
 
 /// Scores of the blocks of a log.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scores {
+pub struct BlockScores {
     /// theta_0: each joint's own unknowns.
     pub at: Vec<DVector<f64>>,
     /// Step of the scores of each; 0 where all of them are.
@@ -35,7 +35,7 @@ pub struct Scores {
     pub blocks: Vec<BlockScore>,
 }
 
-impl Scores {
+impl BlockScores {
     /// Scores of joint j at theta, its own unknowns; `x` and `t` are the columns of its R factor and the target.
     pub fn at_theta(
         &self,
@@ -130,13 +130,13 @@ pub fn steps(score: f64, step: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn scores(stretches: &[usize]) -> Scores {
+    fn scores(stretches: &[usize]) -> BlockScores {
         let block = |(k, stretch): (usize, &usize)| BlockScore {
             stretch: *stretch,
             rows: 3,
             of_joint: vec![DVector::from_element(1, k as f64)],
         };
-        Scores {
+        BlockScores {
             at: vec![DVector::zeros(1)],
             step: vec![DVector::zeros(1)],
             blocks: stretches.iter().enumerate().map(block).collect(),
@@ -171,7 +171,7 @@ mod tests {
             rows: 1,
             of_joint: vec![x.row(row).transpose() * t[row]],
         };
-        let scores = Scores {
+        let scores = BlockScores {
             at: vec![DVector::zeros(2)],
             step: vec![DVector::zeros(2)],
             blocks: (0..3).map(block).collect(),

@@ -38,7 +38,8 @@ pub struct ConditionNumbers {
 
 /// A combination of unknowns that the data do not distinguish: coefficients of the scaled columns.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Confounded {
+#[schemars(rename = "Confounded")]
+pub struct ConfoundedUnknowns {
     /// Index of the unknown and its coefficient, largest first.
     pub terms: Vec<(usize, f64)>,
 }
@@ -94,7 +95,7 @@ pub(super) struct WeightedSolution {
     /// Inverse of the weighted normal matrix on the directions that are open to the data.
     pub inverse: DMatrix<f64>,
     pub determined: Vec<bool>,
-    pub confounded: Vec<Confounded>,
+    pub confounded: Vec<ConfoundedUnknowns>,
 }
 
 /// R factor of all joints' rows, unknowns and target, each joint times its weight, and of a prior.
@@ -204,12 +205,15 @@ pub(super) fn solve(
 }
 
 /// The directions that the data leave open, each unknown without a column by itself.
-fn open_directions(lost: impl Iterator<Item = DVector<f64>>, scale: &[f64]) -> Vec<Confounded> {
+fn open_directions(
+    lost: impl Iterator<Item = DVector<f64>>,
+    scale: &[f64],
+) -> Vec<ConfoundedUnknowns> {
     let silent = |i: &usize| scale[*i] == 0.0;
-    let single = |i: usize| Confounded {
+    let single = |i: usize| ConfoundedUnknowns {
         terms: vec![(i, 1.0)],
     };
-    let mut out: Vec<Confounded> = (0..scale.len()).filter(silent).map(single).collect();
+    let mut out: Vec<ConfoundedUnknowns> = (0..scale.len()).filter(silent).map(single).collect();
     let mut others: Vec<DVector<f64>> = Vec::new();
     for mut v in lost {
         (0..scale.len()).filter(silent).for_each(|i| v[i] = 0.0);
@@ -223,7 +227,7 @@ fn open_directions(lost: impl Iterator<Item = DVector<f64>>, scale: &[f64]) -> V
         let terms = v.iter().copied().enumerate();
         let mut terms: Vec<(usize, f64)> = terms.filter(|(_, x)| x.abs() > SHARE).collect();
         terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        out.push(Confounded { terms });
+        out.push(ConfoundedUnknowns { terms });
         others.push(v);
     }
     out

@@ -6,16 +6,17 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::accumulate::{BlockFactors, JointRows, RelativeResidual};
-use super::covariance::{Covariances, covariance};
+use super::covariance::{FitCovariances, covariance};
 use super::solution::{
-    ConditionNumbers, Confounded, FitError, FitInputs, conditions, joints, residual_std, solve,
-    stacked,
+    ConditionNumbers, ConfoundedUnknowns, FitError, FitInputs, conditions, joints, residual_std,
+    solve, stacked,
 };
 
 /// Which rows count how much.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Weighting {
+#[schemars(rename = "Weighting")]
+pub enum RowWeighting {
     /// Rows weighted by each joint's residual of an ordinary fit (two steps).
     #[default]
     Wls,
@@ -35,7 +36,7 @@ pub struct Fit {
     pub friction_sensitivity: Vec<Option<DMatrix<f64>>>,
     /// False where the unknown has a part in a combination that the data leave open.
     pub determined: Vec<bool>,
-    pub confounded: Vec<Confounded>,
+    pub confounded: Vec<ConfoundedUnknowns>,
     pub condition: ConditionNumbers,
     pub rank: usize,
     /// Standard deviation of each joint's residual [N or Nm], filtered.
@@ -56,10 +57,10 @@ pub struct Fit {
 ///
 /// # Errors
 /// [`FitError`].
-pub fn fit(factors: &BlockFactors, estimator: Weighting) -> Result<Fit, FitError> {
+pub fn fit(factors: &BlockFactors, estimator: RowWeighting) -> Result<Fit, FitError> {
     let joints = joints(factors)?;
     let mut weights = vec![1.0; factors.columns.joints];
-    if estimator == Weighting::Wls {
+    if estimator == RowWeighting::Wls {
         // noise of each joint from the step before; two steps settle it
         for _ in 0..2 {
             let theta = solve(factors, &joints, &weights, None)?.theta;
@@ -137,7 +138,7 @@ fn finish(
             column_rms[(j, columns.unknown(j, c))] = r.column(c).norm() / of_joint.sqrt();
         }
     }
-    let Covariances {
+    let FitCovariances {
         sandwich, textbook, ..
     } = &covariances;
     let sure = (0..u).filter(|&i| solution.determined[i] && sandwich[(i, i)] > 0.0);
@@ -167,7 +168,7 @@ fn finish(
 #[cfg(test)]
 mod tests {
     use super::super::BLOCK_SECONDS;
-    use super::super::columns::{KnownFriction, Own, RegressorColumns};
+    use super::super::columns::{JointTerm, KnownFriction, RegressorColumns};
     use super::*;
     use crate::robot::friction::DoubleTanh;
 
@@ -183,7 +184,7 @@ mod tests {
     }
 
     fn viscous_and_coulomb() -> RegressorColumns {
-        RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb], None)
+        RegressorColumns::of_one(&[JointTerm::Viscous, JointTerm::Coulomb], None)
     }
 
     /// Speed, acceleration and force of a joint with inertia 3 and a friction, and noise of a correlation.
@@ -214,7 +215,7 @@ mod tests {
 
     #[test]
     fn exact_rows_give_the_exact_parameters() {
-        let fit = fit(&factors(3000, [0.0; 2], 1), Weighting::Ols).unwrap();
+        let fit = fit(&factors(3000, [0.0; 2], 1), RowWeighting::Ols).unwrap();
         for (found, truth) in fit.theta.iter().zip([3.0, 2.0, 0.7]) {
             assert!((found - truth).abs() < 1e-12, "{found} {truth}");
         }
@@ -227,8 +228,8 @@ mod tests {
         let many = factors(60_000, [0.1, 0.9], 2);
         assert!(many.blocks.len() <= 512);
         assert_eq!(many.blocks.iter().map(|b| b.rows).sum::<u64>(), 60_000);
-        let halved = fit(&many, Weighting::Ols).unwrap();
-        let whole = fit(&in_blocks(1e9, 60_000, [0.1, 0.9], 2), Weighting::Ols).unwrap();
+        let halved = fit(&many, RowWeighting::Ols).unwrap();
+        let whole = fit(&in_blocks(1e9, 60_000, [0.1, 0.9], 2), RowWeighting::Ols).unwrap();
         assert!((&halved.theta - &whole.theta).amax() < 1e-12);
         let mut merged = many.clone();
         merged.merge(factors(500, [0.1, 0.9], 3));
@@ -243,7 +244,7 @@ mod tests {
             let (mut covered, mut textbook, runs) = ([0; 3], [0; 3], 200);
             for seed in 0..runs {
                 let s = factors(4000, [0.3, correlation], 10 + seed);
-                let fit = fit(&s, Weighting::Wls).unwrap();
+                let fit = fit(&s, RowWeighting::Wls).unwrap();
                 for (i, truth) in [3.0, 2.0, 0.7].into_iter().enumerate() {
                     let off = (fit.theta[i] - truth).abs();
                     covered[i] += u64::from(off < 1.96 * fit.covariance[(i, i)].sqrt());
@@ -266,14 +267,17 @@ mod tests {
 
     #[test]
     fn columns_that_the_motion_cannot_part_are_named_and_not_numbered() {
-        let columns = RegressorColumns::of_one(&[Own::Viscous, Own::Coulomb, Own::Offset], None);
+        let columns = RegressorColumns::of_one(
+            &[JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset],
+            None,
+        );
         let mut chance = Chance(99);
         let rows = (0..2000).map(|_| {
             // always forward: Coulomb friction and offset are one column
             let (v, a) = (1.0 + 0.5 * chance.next(), chance.next());
             [v, a, 3.0 * a + 2.0 * v + 0.7]
         });
-        let fit = fit(&columns.rows_of_one(BLOCK_SECONDS, rows), Weighting::Wls).unwrap();
+        let fit = fit(&columns.rows_of_one(BLOCK_SECONDS, rows), RowWeighting::Wls).unwrap();
         assert_eq!(fit.rank, 3);
         assert_eq!(fit.determined, [true, true, false, false]);
         assert_eq!(fit.condition.raw, None);
@@ -300,7 +304,7 @@ mod tests {
             };
             let rows = rows(|v| law.torque(v), 3000, [0.0; 2], 4);
             let rows = RegressorColumns::of_one(&[], Some(known)).rows_of_one(BLOCK_SECONDS, rows);
-            fit(&rows, Weighting::Ols).unwrap()
+            fit(&rows, RowWeighting::Ols).unwrap()
         };
         let base = read(law);
         let s = base.friction_sensitivity[0].clone().unwrap();

@@ -10,12 +10,12 @@ use crate::motion::RunError;
 const WAITING: usize = 4;
 
 /// Where the first pass puts its rows.
-pub(super) struct Outlet {
+pub(super) struct BlockOutlet {
     block: Block,
     sender: SyncSender<Block>,
 }
 
-impl Outlet {
+impl BlockOutlet {
     /// Takes a row.
     pub fn row(&mut self, write: impl FnOnce(&mut Block)) {
         write(&mut self.block);
@@ -32,7 +32,7 @@ impl Outlet {
 
 /// Runs both passes; an error is that of the first, otherwise that of the second.
 pub(super) fn two_passes<E: Send, A: Send, B>(
-    first: impl FnOnce(&mut Outlet) -> Result<A, RunError<E>> + Send,
+    first: impl FnOnce(&mut BlockOutlet) -> Result<A, RunError<E>> + Send,
     second: impl FnOnce(
         &mut dyn FnMut(&mut Block) -> Result<bool, Infallible>,
     ) -> Result<B, RunError<Infallible>>,
@@ -41,7 +41,7 @@ pub(super) fn two_passes<E: Send, A: Send, B>(
     std::thread::scope(|scope| {
         let first = scope.spawn(move || {
             let block = Block::default();
-            let mut outlet = Outlet { block, sender };
+            let mut outlet = BlockOutlet { block, sender };
             // a pool of its own: a worker of the shared one may be waiting for these very blocks
             let found = match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
                 Ok(pool) => pool.install(|| first(&mut outlet)),

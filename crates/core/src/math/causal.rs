@@ -1,10 +1,10 @@
 //! A section cascade run forward alone, sample by sample, over several channels.
 
-use super::sos::{Section, Sos, steady};
+use super::sos::{Section, SosFilter, steady};
 
 /// A causal filter of some channels with their states; each starts in the steady state of its first value.
 #[derive(Debug, Clone)]
-pub struct Causal {
+pub struct CausalSections {
     sections: Vec<Section>,
     channels: usize,
     /// State of each section after a long constant input of 1 to the cascade.
@@ -14,9 +14,9 @@ pub struct Causal {
     fresh: bool,
 }
 
-impl Causal {
+impl CausalSections {
     /// The same filter for `channels` channels; none lets them through as they are.
-    pub fn new(sos: Option<&Sos>, channels: usize) -> Self {
+    pub fn new(sos: Option<&SosFilter>, channels: usize) -> Self {
         let sections = sos.map_or(Vec::new(), |sos| sos.sections().to_vec());
         let steady = steady(&sections);
         Self {
@@ -59,7 +59,7 @@ impl Causal {
 }
 
 /// Time by which slow signals leave a cascade late, in samples: its group delay at zero frequency.
-pub fn delay_samples(sos: &Sos) -> f64 {
+pub fn delay_samples(sos: &SosFilter) -> f64 {
     // -d arg H / dw at 0 of B/A: (sum k b_k)/(sum b_k) - (sum k a_k)/(sum a_k)
     let of = |[x0, x1, x2]: [f64; 3]| (x1 + 2.0 * x2) / (x0 + x1 + x2);
     let sections = sos.sections().iter();
@@ -72,14 +72,14 @@ mod tests {
 
     #[test]
     fn a_ramp_comes_out_late_by_the_group_delay_and_a_constant_as_it_is() {
-        let sos = Sos::butterworth(4, 20.0, 1000.0).unwrap();
+        let sos = SosFilter::butterworth(4, 20.0, 1000.0).unwrap();
         let late = delay_samples(&sos);
         // order 4: 2.613 / (2 pi 20 Hz)
         assert!(
             (late - 2.6131 / (std::f64::consts::TAU * 0.02)).abs() < 0.1,
             "{late}"
         );
-        let mut filter = Causal::new(Some(&sos), 2);
+        let mut filter = CausalSections::new(Some(&sos), 2);
         let mut x = [0.0; 2];
         for k in 0..2000 {
             x = [3.0, 0.5 * f64::from(k)];

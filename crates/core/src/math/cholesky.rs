@@ -12,20 +12,21 @@ const TOGETHER: usize = 4;
 #[must_use]
 pub fn solve(a: &mut DMatrix<f64>, b: &mut DVector<f64>) -> bool {
     debug_assert!(a.is_square() && a.nrows() == b.len(), "as many as rows");
-    widest(Solve {
+    widest(CholeskySolve {
         n: b.len(),
         a: a.as_mut_slice(),
         b: b.as_mut_slice(),
     })
 }
 
-struct Solve<'a> {
+/// A system `A x = b` with `n` unknowns, solved in place.
+struct CholeskySolve<'a> {
     n: usize,
     a: &'a mut [f64],
     b: &'a mut [f64],
 }
 
-impl LaneWork for Solve<'_> {
+impl LaneWork for CholeskySolve<'_> {
     type Output = bool;
 
     #[inline(always)]

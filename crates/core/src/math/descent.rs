@@ -9,7 +9,8 @@ use serde::Serialize;
 /// How an iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Ending {
+#[schemars(rename = "Ending")]
+pub enum IterationEnding {
     /// The last step moved nothing that matters, or none is short enough to be of use.
     Converged,
     /// The steps are used up; the last one's result stands.
@@ -68,7 +69,7 @@ pub fn descend<S, E>(
     control: &StepControl,
     most: usize,
     step: &mut DescentStep<S, E>,
-) -> Result<(S, Ending, usize), E> {
+) -> Result<(S, IterationEnding, usize), E> {
     let (mut at, mut damping) = (start, START);
     let [least, greatest] = control.range;
     for tried in 1..=most {
@@ -77,14 +78,16 @@ pub fn descend<S, E>(
                 at = next;
                 damping = (damping / control.accepted).clamp(least, greatest);
             }
-            Trial::Rejected if damping >= greatest => return Ok((at, Ending::Converged, tried)),
+            Trial::Rejected if damping >= greatest => {
+                return Ok((at, IterationEnding::Converged, tried));
+            }
             Trial::Rejected => damping = damping.max(control.rejected_from) * control.rejected,
-            Trial::Last(next) => return Ok((next, Ending::Converged, tried)),
-            Trial::Settled => return Ok((at, Ending::Converged, tried)),
-            Trial::NoStep => return Ok((at, Ending::Diverged, tried)),
+            Trial::Last(next) => return Ok((next, IterationEnding::Converged, tried)),
+            Trial::Settled => return Ok((at, IterationEnding::Converged, tried)),
+            Trial::NoStep => return Ok((at, IterationEnding::Diverged, tried)),
         }
     }
-    Ok((at, Ending::IterationLimit, most))
+    Ok((at, IterationEnding::IterationLimit, most))
 }
 
 #[cfg(test)]
@@ -95,7 +98,7 @@ mod tests {
     const DAMPING: StepControl = StepControl::damping(10.0, 10.0, [1e-9, 1e6]);
 
     /// The least of ln(1 + x^2), whose Gauss-Newton step overshoots where it is not damped.
-    fn lowest(most: usize) -> (f64, Ending, usize) {
+    fn lowest(most: usize) -> (f64, IterationEnding, usize) {
         let cost = |x: f64| (1.0 + x * x).ln();
         let Ok(found) = descend(40.0, &DAMPING, most, &mut |x: &f64, damping: f64| {
             let (slope, curvature) = (2.0 * x / (1.0 + x * x), 2.0 / (1.0 + x * x).powi(2));
@@ -112,9 +115,9 @@ mod tests {
     #[test]
     fn damped_steps_come_down_where_whole_ones_overshoot() {
         let (x, ending, tried) = lowest(200);
-        assert_eq!(ending, Ending::Converged);
+        assert_eq!(ending, IterationEnding::Converged);
         assert!(x.abs() < 1e-5 && tried < 150, "{x} after {tried}");
-        assert_eq!(lowest(3).1, Ending::IterationLimit);
+        assert_eq!(lowest(3).1, IterationEnding::IterationLimit);
     }
 
     #[test]
@@ -129,7 +132,10 @@ mod tests {
             Ok::<_, Infallible>(Trial::Rejected)
         });
         // 1e-3, then 1e2 to 1e6
-        assert_eq!((ending, tried, tries.len()), (Ending::Converged, 6, 6));
+        assert_eq!(
+            (ending, tried, tries.len()),
+            (IterationEnding::Converged, 6, 6)
+        );
         assert!(
             tries
                 .iter()

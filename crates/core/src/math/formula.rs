@@ -10,7 +10,7 @@ use exmex::{
 #[derive(Debug, Clone)]
 pub struct Formula {
     text: String,
-    compiled: FlatEx<f64, FloatOpsFactory<f64>, Number>,
+    compiled: FlatEx<f64, FloatOpsFactory<f64>, WrittenNumber>,
 }
 
 /// Most names in one formula.
@@ -22,7 +22,7 @@ impl Formula {
     /// # Errors
     /// Why it is none.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let compiled = FlatEx::<f64, FloatOpsFactory<f64>, Number>::parse(text)
+        let compiled = FlatEx::<f64, FloatOpsFactory<f64>, WrittenNumber>::parse(text)
             .map_err(|error| error.to_string())?;
         let names = compiled.var_names().len();
         if names > MOST_NAMES {
@@ -53,8 +53,8 @@ impl Formula {
     /// # Errors
     /// What the parser says, which has read the formula before.
     pub fn code(&self, of: &[String]) -> Result<String, String> {
-        let names: Vec<Code> = of.iter().map(|text| Code::operand(text)).collect();
-        let read = FlatEx::<Code, CodeOperators, Number>::parse(&self.text);
+        let names: Vec<FormulaCode> = of.iter().map(|text| FormulaCode::operand(text)).collect();
+        let read = FlatEx::<FormulaCode, CodeOperators, WrittenNumber>::parse(&self.text);
         let written = read.and_then(|formula| formula.eval(&names));
         written
             .map(|code| code.in_brackets())
@@ -64,9 +64,9 @@ impl Formula {
 
 /// Numbers as they are written, powers of ten included: 2, .5, 1e-3.
 #[derive(Debug, Clone)]
-struct Number;
+struct WrittenNumber;
 
-impl MatchLiteral for Number {
+impl MatchLiteral for WrittenNumber {
     fn is_literal(text: &str) -> Option<&str> {
         let digits = NumberMatcher::is_literal(text)?;
         let rest = text.get(digits.len()..)?;
@@ -82,13 +82,13 @@ impl MatchLiteral for Number {
 
 /// A number as text of a program: the formula is evaluated in it by the same parser.
 #[derive(Debug, Clone, Default)]
-struct Code {
+struct FormulaCode {
     text: String,
     /// Needs brackets as an operand.
     compound: bool,
 }
 
-impl FromStr for Code {
+impl FromStr for FormulaCode {
     type Err = std::num::ParseFloatError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -96,7 +96,7 @@ impl FromStr for Code {
     }
 }
 
-impl Code {
+impl FormulaCode {
     fn number(x: f64) -> Self {
         Self::operand(&format!("{x:?}"))
     }
@@ -138,7 +138,7 @@ macro_rules! between {
         BinOp {
             apply: |x, y| {
                 let (x, y) = (x.in_brackets(), y.in_brackets());
-                Code::compound(format!(concat!("{} ", $text, " {}"), x, y))
+                FormulaCode::compound(format!(concat!("{} ", $text, " {}"), x, y))
             },
             prio: $prio,
             is_commutative: $commutes,
@@ -152,7 +152,7 @@ macro_rules! of_two {
         Operator::make_bin(
             $name,
             BinOp {
-                apply: |x, y| Code::call($function, &[&x, &y]),
+                apply: |x, y| FormulaCode::call($function, &[&x, &y]),
                 prio: $prio,
                 is_commutative: false,
             },
@@ -163,29 +163,31 @@ macro_rules! of_two {
 /// Functions of one.
 macro_rules! of_one {
     ($($name:literal $function:literal),* $(,)?) => {
-        [$(Operator::make_unary($name, |x| Code::call($function, &[&x]))),*]
+        [$(Operator::make_unary($name, |x| FormulaCode::call($function, &[&x]))),*]
     };
 }
 
-impl MakeOperators<Code> for CodeOperators {
-    fn make<'a>() -> Vec<Operator<'a, Code>> {
+impl MakeOperators<FormulaCode> for CodeOperators {
+    fn make<'a>() -> Vec<Operator<'a, FormulaCode>> {
         use std::f64::consts::{E, PI, TAU};
-        let constant = |name, x| Operator::make_constant(name, Code::number(x));
+        let constant = |name, x| Operator::make_constant(name, FormulaCode::number(x));
         let mut all = vec![
             of_two!("^", 4, "pow"),
             Operator::make_bin("*", between!(2, true, "*")),
             Operator::make_bin("/", between!(3, false, "/")),
             Operator::make_bin_unary("+", between!(0, true, "+"), |x| x),
             Operator::make_bin_unary("-", between!(1, false, "-"), |x| {
-                Code::compound(format!("-{}", x.in_brackets()))
+                FormulaCode::compound(format!("-{}", x.in_brackets()))
             }),
             of_two!("atan2", 0, "atan2"),
             of_two!("min", 0, "fmin"),
             of_two!("max", 0, "fmax"),
             Operator::make_unary("signum", |x| {
-                Code::call("copysign", &[&Code::number(1.0), &x])
+                FormulaCode::call("copysign", &[&FormulaCode::number(1.0), &x])
             }),
-            Operator::make_unary("fract", |x| Code::call("fmod", &[&x, &Code::number(1.0)])),
+            Operator::make_unary("fract", |x| {
+                FormulaCode::call("fmod", &[&x, &FormulaCode::number(1.0)])
+            }),
             constant("PI", PI),
             constant("π", PI),
             constant("E", E),

@@ -17,7 +17,7 @@ pub fn stride(columns: usize) -> usize {
 pub fn gram(rows: &[f64], columns: usize) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(columns, columns);
     if columns > 0 {
-        widest(Products {
+        widest(GramProducts {
             rows,
             columns,
             out: out.as_mut_slice(),
@@ -26,13 +26,14 @@ pub fn gram(rows: &[f64], columns: usize) -> DMatrix<f64> {
     out
 }
 
-struct Products<'a> {
+/// Products of the columns of a block of rows, which are summed up in `out`.
+struct GramProducts<'a> {
     rows: &'a [f64],
     columns: usize,
     out: &'a mut [f64],
 }
 
-impl LaneWork for Products<'_> {
+impl LaneWork for GramProducts<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Thin singular value decomposition `A = U diag(s) V'` of an `m x n` matrix, `k = min(m, n)`.
 #[derive(Debug, Clone)]
-pub struct Svd {
+pub struct SvdFactors {
     /// Left singular vectors, `m x k`.
     pub u: DMatrix<f64>,
     /// Singular values in falling order, `k`.
@@ -22,10 +22,10 @@ const SWEEPS: usize = 60;
 /// Thin singular value decomposition `A = U diag(s) V'`, s in falling order.
 ///
 /// Columns of U that belong to a zero singular value are zero. Entries must be finite.
-pub fn svd(a: &DMatrix<f64>) -> Svd {
+pub fn svd(a: &DMatrix<f64>) -> SvdFactors {
     if a.nrows() < a.ncols() {
-        let Svd { u, s, v } = svd(&a.transpose());
-        return Svd { u: v, s, v: u };
+        let SvdFactors { u, s, v } = svd(&a.transpose());
+        return SvdFactors { u: v, s, v: u };
     }
     let n = a.ncols();
     let mut u = a.clone();
@@ -55,7 +55,7 @@ pub fn svd(a: &DMatrix<f64>) -> Svd {
     let norms: Vec<f64> = u.column_iter().map(|column| column.norm()).collect();
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&i, &j| norms[j].total_cmp(&norms[i]));
-    let mut sorted = Svd {
+    let mut sorted = SvdFactors {
         u: DMatrix::zeros(a.nrows(), n),
         s: DVector::zeros(n),
         v: DMatrix::zeros(n, n),

@@ -19,8 +19,9 @@ const GROUP: usize = 8;
 /// Sums that are formed at once: they stay in registers.
 const TOGETHER: usize = 3;
 
-type Lanes = [f64; GROUP];
-const ZERO: Lanes = [0.0; GROUP];
+/// One number of each lane of a group.
+type LaneGroup = [f64; GROUP];
+const ZERO: LaneGroup = [0.0; GROUP];
 
 /// A filter that keeps every so many outputs.
 #[derive(Debug, Clone)]
@@ -136,7 +137,7 @@ impl KeptEvery {
             (begin, stretches) = (0, 0);
         }
         rows.read(&mut work.rows, 0..begin.max(pad + 1));
-        self.do_lanes(Part::Begin(begin), work, stride);
+        self.do_lanes(StretchPart::Begin(begin), work, stride);
         let skipped = (of.first - begin) / self.every;
         for k in 0..stretches {
             // what was read beyond the rows before is the first of these
@@ -145,13 +146,13 @@ impl KeptEvery {
             work.rows.drain(..seen * stride);
             rows.read(&mut work.rows, from..from + self.every);
             let at = (k >= skipped).then_some((k - skipped.min(k)) * (states + 1) * stride);
-            self.do_lanes(Part::Stretch(at), work, stride);
+            self.do_lanes(StretchPart::Stretch(at), work, stride);
         }
         let tail = begin + stretches * self.every;
         let seen = tail - work.rows_from(rows.next, stride);
         work.rows.drain(..seen * stride);
         rows.read(&mut work.rows, tail..of.samples);
-        self.do_lanes(Part::End, work, stride);
+        self.do_lanes(StretchPart::End, work, stride);
         let mut keep = |k: usize, z: &[f64]| {
             if k >= of.first && (k - of.first).is_multiple_of(self.every) {
                 let row = (k - of.first) / self.every;
@@ -165,14 +166,14 @@ impl KeptEvery {
         }
         let size = (states + 1) * stride;
         for k in (0..work.parts.len() / size).rev() {
-            self.do_lanes(Part::Back(k * size), work, stride);
+            self.do_lanes(StretchPart::Back(k * size), work, stride);
             let from = begin + (skipped + k) * self.every;
             keep(from, &work.parts[k * size..k * size + stride]);
         }
         Ok(out)
     }
 
-    fn do_lanes(&self, part: Part, work: &mut KeptWork, stride: usize) {
+    fn do_lanes(&self, part: StretchPart, work: &mut KeptWork, stride: usize) {
         widest(PartOf {
             of: self,
             part,
@@ -207,7 +208,7 @@ impl KeptEvery {
             let found = sums_of(&work.rows[g * GROUP..], stride, &self.of_sample, (width, k));
             sums.copy_from_slice(&found);
         }
-        let s: [Lanes; MOST_STATES] = group(&work.state, (g, stride), states);
+        let s: [LaneGroup; MOST_STATES] = group(&work.state, (g, stride), states);
         for (s, weights) in s.iter().zip(&self.of_forward) {
             for (sum, w) in sums.iter_mut().zip(weights) {
                 add(sum, *w, s);
@@ -223,7 +224,12 @@ impl KeptEvery {
 
     /// Forward over the rows that are left, and back: outputs in their place, and the state before them.
     #[inline(always)]
-    fn end(&self, work: &mut KeptWork, (g, stride): (usize, usize), extension: &mut Vec<Lanes>) {
+    fn end(
+        &self,
+        work: &mut KeptWork,
+        (g, stride): (usize, usize),
+        extension: &mut Vec<LaneGroup>,
+    ) {
         let count = work.rows.len() / stride;
         let pad = self.filter.sos().pad_samples();
         let place = |k: usize| k * stride + g * GROUP;
@@ -231,7 +237,8 @@ impl KeptEvery {
         extension.clear();
         extension
             .extend((1..=pad).map(|i| reflected(last, lanes(&work.rows, place(count - 1 - i)))));
-        let mut s: [Lanes; MOST_STATES] = group(&work.state, (g, stride), self.of_forward.len());
+        let mut s: [LaneGroup; MOST_STATES] =
+            group(&work.state, (g, stride), self.of_forward.len());
         for k in 0..count {
             let y = self.step(&mut s, lanes(&work.rows, place(k)));
             put(&mut work.rows, place(k), &y);
@@ -254,7 +261,7 @@ impl KeptEvery {
     #[inline(always)]
     fn back(&self, work: &mut KeptWork, (g, stride): (usize, usize), at: usize) {
         let count = self.of_backward.len() + 1;
-        let mut sums: [Lanes; MOST_STATES + 1] = group(&work.parts[at..], (g, stride), count);
+        let mut sums: [LaneGroup; MOST_STATES + 1] = group(&work.parts[at..], (g, stride), count);
         for (m, weights) in self.of_backward.iter().enumerate() {
             let r = lanes(&work.state, m * stride + g * GROUP);
             for (sum, w) in sums.iter_mut().zip(weights) {
@@ -266,14 +273,14 @@ impl KeptEvery {
     }
 
     #[inline(always)]
-    fn keep_state(&self, work: &mut KeptWork, (g, stride): (usize, usize), state: &[Lanes]) {
+    fn keep_state(&self, work: &mut KeptWork, (g, stride): (usize, usize), state: &[LaneGroup]) {
         for (m, s) in state[..self.of_forward.len()].iter().enumerate() {
             put(&mut work.state, m * stride + g * GROUP, s);
         }
     }
 
     #[inline(always)]
-    fn settled(&self, x: Lanes) -> [Lanes; MOST_STATES] {
+    fn settled(&self, x: LaneGroup) -> [LaneGroup; MOST_STATES] {
         let steady = self.filter.steady().iter().flatten();
         let mut state = [ZERO; MOST_STATES];
         for (s, steady) in state.iter_mut().zip(steady) {
@@ -283,7 +290,7 @@ impl KeptEvery {
     }
 
     #[inline(always)]
-    fn step(&self, state: &mut [Lanes; MOST_STATES], mut x: Lanes) -> Lanes {
+    fn step(&self, state: &mut [LaneGroup; MOST_STATES], mut x: LaneGroup) -> LaneGroup {
         let sections = self.filter.sos().sections().iter();
         for (section, s) in sections.zip(state.chunks_exact_mut(2)) {
             let (b, a) = (section.b, section.a);
@@ -329,8 +336,9 @@ impl Rows<'_> {
     }
 }
 
+/// A part of the run of both passes: its two ends, and what lies between outputs that are kept.
 #[derive(Clone, Copy)]
-enum Part {
+enum StretchPart {
     /// So many rows are no stretch.
     Begin(usize),
     /// Where z and r' go, if they are asked for.
@@ -342,7 +350,7 @@ enum Part {
 
 struct PartOf<'a> {
     of: &'a KeptEvery,
-    part: Part,
+    part: StretchPart,
     work: &'a mut KeptWork,
     stride: usize,
 }
@@ -358,7 +366,7 @@ impl LaneWork for PartOf<'_> {
             work,
             stride,
         } = self;
-        if let Part::Stretch(Some(to)) = part {
+        if let StretchPart::Stretch(Some(to)) = part {
             work.parts
                 .resize(to + (of.of_forward.len() + 1) * stride, 0.0);
         }
@@ -366,17 +374,17 @@ impl LaneWork for PartOf<'_> {
         for g in 0..stride / GROUP {
             let mut own = work.rows.chunks_exact(stride);
             let zero = |row: &[f64]| row[g * GROUP..(g + 1) * GROUP].iter().all(|x| *x == 0.0);
-            let seen = !matches!(part, Part::Back(_));
+            let seen = !matches!(part, StretchPart::Back(_));
             work.empty[g] = work.empty[g] && !(seen && own.any(|row| !zero(row)));
             if work.empty[g] {
                 continue;
             }
             let at = (g, stride);
             match part {
-                Part::Begin(count) => of.begin(work, at, count),
-                Part::Stretch(to) => of.stretch(work, at, to),
-                Part::End => of.end(work, at, &mut extension),
-                Part::Back(from) => of.back(work, at, from),
+                StretchPart::Begin(count) => of.begin(work, at, count),
+                StretchPart::Stretch(to) => of.stretch(work, at, to),
+                StretchPart::End => of.end(work, at, &mut extension),
+                StretchPart::Back(from) => of.back(work, at, from),
             }
         }
     }
@@ -389,7 +397,7 @@ fn sums_of(
     stride: usize,
     weights: &[f64],
     (width, k): (usize, usize),
-) -> [Lanes; TOGETHER] {
+) -> [LaneGroup; TOGETHER] {
     let mut sums = [ZERO; TOGETHER];
     for (row, weights) in rows.chunks(stride).zip(weights.chunks_exact(width)) {
         let x = lanes(row, 0);
@@ -404,7 +412,7 @@ fn sums_of(
 }
 
 #[inline(always)]
-fn lanes(of: &[f64], at: usize) -> Lanes {
+fn lanes(of: &[f64], at: usize) -> LaneGroup {
     let mut out = ZERO;
     out.copy_from_slice(&of[at..at + GROUP]);
     out
@@ -412,7 +420,7 @@ fn lanes(of: &[f64], at: usize) -> Lanes {
 
 /// A group's channels of each of `count` rows, and zeros for those that are not there.
 #[inline(always)]
-fn group<const N: usize>(of: &[f64], (g, stride): (usize, usize), count: usize) -> [Lanes; N] {
+fn group<const N: usize>(of: &[f64], (g, stride): (usize, usize), count: usize) -> [LaneGroup; N] {
     std::array::from_fn(|m| match m < count {
         true => lanes(of, m * stride + g * GROUP),
         false => ZERO,
@@ -420,12 +428,12 @@ fn group<const N: usize>(of: &[f64], (g, stride): (usize, usize), count: usize) 
 }
 
 #[inline(always)]
-fn put(to: &mut [f64], at: usize, x: &Lanes) {
+fn put(to: &mut [f64], at: usize, x: &LaneGroup) {
     to[at..at + GROUP].copy_from_slice(x);
 }
 
 #[inline(always)]
-fn add(to: &mut Lanes, w: f64, x: &Lanes) {
+fn add(to: &mut LaneGroup, w: f64, x: &LaneGroup) {
     for (to, x) in to.iter_mut().zip(x) {
         *to += w * x;
     }
@@ -433,7 +441,7 @@ fn add(to: &mut Lanes, w: f64, x: &Lanes) {
 
 /// 2 end - x.
 #[inline(always)]
-fn reflected(end: Lanes, x: Lanes) -> Lanes {
+fn reflected(end: LaneGroup, x: LaneGroup) -> LaneGroup {
     std::array::from_fn(|l| 2.0 * end[l] - x[l])
 }
 

@@ -16,12 +16,13 @@ pub trait LaneWork {
 /// sums, and no product is fused with a sum.
 #[inline(always)]
 pub fn widest<W: LaneWork>(work: W) -> W::Output {
-    pulp::Arch::new().dispatch(Wide(work))
+    pulp::Arch::new().dispatch(WideLanes(work))
 }
 
-struct Wide<W>(W);
+/// Work over lanes, for `pulp` to give the widest vectors to.
+struct WideLanes<W>(W);
 
-impl<W: LaneWork> pulp::WithSimd for Wide<W> {
+impl<W: LaneWork> pulp::WithSimd for WideLanes<W> {
     type Output = W::Output;
 
     #[inline(always)]

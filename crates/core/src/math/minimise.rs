@@ -28,7 +28,7 @@ pub enum SearchEnding {
 
 /// The best point that a search evaluated.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Minimum {
+pub struct MinimumPoint {
     pub x: Vec<f64>,
     pub value: f64,
     /// Evaluations of the function (and its gradient) that were spent.
@@ -48,9 +48,9 @@ pub fn nelder_mead(
     steps: &[f64],
     tolerance: f64,
     max_evaluations: u64,
-) -> Minimum {
+) -> MinimumPoint {
     let mut values = |x: &[f64], _: &mut [f64]| f(x);
-    let mut search = Search::new(&mut values, start, max_evaluations);
+    let mut search = BudgetedSearch::new(&mut values, start, max_evaluations);
     search.levels_out = true;
     if let Some(ending) = search.begin() {
         return search.end(ending);
@@ -68,7 +68,7 @@ pub fn nelder_mead(
         let outcome = NelderMead::new(simplex)
             .with_sd_tolerance(tolerance)
             .and_then(|solver| {
-                Executor::new(Problem(&search), solver)
+                Executor::new(SearchProblem(&search), solver)
                     // every step asks for a value at least: this only bounds what follows a refusal
                     .configure(|state| state.max_iters(max_evaluations))
                     .timer(false)
@@ -93,8 +93,8 @@ pub fn lbfgs(
     start: &[f64],
     gradient_tolerance: f64,
     max_evaluations: u64,
-) -> Minimum {
-    let mut search = Search::new(f, start, max_evaluations);
+) -> MinimumPoint {
+    let mut search = BudgetedSearch::new(f, start, max_evaluations);
     if let Some(ending) = search.begin() {
         return search.end(ending);
     }
@@ -109,7 +109,7 @@ pub fn lbfgs(
             .with_tolerance_grad(gradient_tolerance * scale)
             .and_then(|solver| solver.with_tolerance_cost(f64::EPSILON * scale))
             .and_then(|solver| {
-                Executor::new(Problem(&search), solver)
+                Executor::new(SearchProblem(&search), solver)
                     .configure(|state| state.param(centre))
                     .timer(false)
                     .run()
@@ -123,7 +123,7 @@ pub fn lbfgs(
 }
 
 /// The function with its budget and the best point so far.
-struct Search<'a> {
+struct BudgetedSearch<'a> {
     f: &'a mut dyn FnMut(&[f64], &mut [f64]) -> f64,
     evaluations: u64,
     limit: u64,
@@ -139,7 +139,7 @@ struct Search<'a> {
     gradient: Vec<f64>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> BudgetedSearch<'a> {
     fn new(f: &'a mut dyn FnMut(&[f64], &mut [f64]) -> f64, start: &[f64], limit: u64) -> Self {
         Self {
             f,
@@ -164,9 +164,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn end(self, ending: SearchEnding) -> Minimum {
+    fn end(self, ending: SearchEnding) -> MinimumPoint {
         let (x, value) = self.best;
-        Minimum {
+        MinimumPoint {
             x,
             value,
             evaluations: self.evaluations,
@@ -208,9 +208,9 @@ impl<'a> Search<'a> {
 }
 
 /// What `argmin` sees of a search.
-struct Problem<'s, 'f>(&'s RefCell<Search<'f>>);
+struct SearchProblem<'s, 'f>(&'s RefCell<BudgetedSearch<'f>>);
 
-impl CostFunction for Problem<'_, '_> {
+impl CostFunction for SearchProblem<'_, '_> {
     type Param = Vec<f64>;
     type Output = f64;
 
@@ -224,7 +224,7 @@ impl CostFunction for Problem<'_, '_> {
     }
 }
 
-impl Gradient for Problem<'_, '_> {
+impl Gradient for SearchProblem<'_, '_> {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
 

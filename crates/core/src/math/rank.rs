@@ -9,7 +9,7 @@ use faer::{Mat, Par};
 use nalgebra::{DMatrix, DVector};
 
 use super::MathError;
-use super::jacobi::{self, Svd};
+use super::jacobi::{self, SvdFactors};
 
 /// Thin singular value decomposition.
 ///
@@ -19,7 +19,7 @@ use super::jacobi::{self, Svd};
 /// # Errors
 /// [`MathError::NotFinite`] for a NaN or infinite entry, [`MathError::NoConvergence`] where both
 /// methods miss the norm of the matrix (overflow, for instance).
-pub fn svd(a: &DMatrix<f64>) -> Result<Svd, MathError> {
+pub fn svd(a: &DMatrix<f64>) -> Result<SvdFactors, MathError> {
     let (m, n) = a.shape();
     for column in 0..n {
         for row in 0..m {
@@ -65,7 +65,7 @@ pub fn rank(s: &DVector<f64>, rows: u64) -> usize {
     s.iter().filter(|&&value| value > threshold).count()
 }
 
-fn by_faer(a: &DMatrix<f64>) -> Option<Svd> {
+fn by_faer(a: &DMatrix<f64>) -> Option<SvdFactors> {
     let (m, n) = a.shape();
     let k = m.min(n);
     let input = Mat::from_fn(m, n, |i, j| a[(i, j)]);
@@ -85,14 +85,14 @@ fn by_faer(a: &DMatrix<f64>) -> Option<Svd> {
     )
     .ok()?;
     let s = s.column_vector();
-    Some(Svd {
+    Some(SvdFactors {
         u: DMatrix::from_fn(m, k, |i, j| u[(i, j)]),
         s: DVector::from_fn(k, |i, _| s[i]),
         v: DMatrix::from_fn(n, k, |i, j| v[(i, j)]),
     })
 }
 
-fn keeps_norm(a: &DMatrix<f64>, svd: &Svd) -> bool {
+fn keeps_norm(a: &DMatrix<f64>, svd: &SvdFactors) -> bool {
     let expected = a.norm_squared();
     let found = svd.s.norm_squared();
     expected.is_finite() && (found - expected).abs() <= 1e-10 * expected

@@ -194,7 +194,7 @@ fn in_order(first: &mut [usize], block: &mut [f64], stride: usize) {
 /// Annihilates rows of the column-major `block`, whose columns begin `stride` apart, under the row-major `triangle`.
 /// Left of `first`, which goes up, the rows are zero.
 fn reduce(first: &[usize], stride: usize, triangle: &mut [f64], block: &mut [f64]) {
-    widest(Reduction {
+    widest(FactorReduction {
         first,
         stride,
         triangle,
@@ -202,14 +202,15 @@ fn reduce(first: &[usize], stride: usize, triangle: &mut [f64], block: &mut [f64
     });
 }
 
-struct Reduction<'a> {
+/// A triangle, and the block of rows that is reduced into it.
+struct FactorReduction<'a> {
     first: &'a [usize],
     stride: usize,
     triangle: &'a mut [f64],
     block: &'a mut [f64],
 }
 
-impl LaneWork for Reduction<'_> {
+impl LaneWork for FactorReduction<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -53,12 +53,13 @@ pub fn steady(sections: &[Section]) -> Vec<[f64; 2]> {
     sections.iter().map(of).collect()
 }
 
+/// A filter as second-order sections, one after the other.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sos {
+pub struct SosFilter {
     sections: Vec<Section>,
 }
 
-impl Sos {
+impl SosFilter {
     /// Butterworth low-pass of `order` 1..=16; gain `1/sqrt 2` at `cutoff_hz` (Hz), sampled at
     /// `rate_hz` (Hz).
     ///

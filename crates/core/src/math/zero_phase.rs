@@ -7,27 +7,27 @@
 
 use super::MathError;
 use super::lanes::{LaneWork, Simd, widest};
-use super::sos::{Sos, steady};
+use super::sos::{SosFilter, steady};
 
-/// Sections of the highest order that [`Sos`] offers.
+/// Sections of the highest order that [`SosFilter`] offers.
 const MAX_SECTIONS: usize = 8;
 
 /// Zero-phase filter with its start states.
 #[derive(Debug, Clone)]
 pub struct ZeroPhase {
-    sos: Sos,
+    sos: SosFilter,
     /// State of each section after a long constant input of 1 to the cascade.
     steady: Vec<[f64; 2]>,
 }
 
 impl ZeroPhase {
     /// Prepares a cascade for forward-backward filtering.
-    pub fn new(sos: Sos) -> Self {
+    pub fn new(sos: SosFilter) -> Self {
         let steady = steady(sos.sections());
         Self { sos, steady }
     }
 
-    pub fn sos(&self) -> &Sos {
+    pub fn sos(&self) -> &SosFilter {
         &self.sos
     }
 
@@ -39,7 +39,7 @@ impl ZeroPhase {
     /// Filters `data`, `samples x channels` row-major, in place.
     ///
     /// # Errors
-    /// [`MathError::TooShort`] unless there are more samples than [`Sos::pad_samples`].
+    /// [`MathError::TooShort`] unless there are more samples than [`SosFilter::pad_samples`].
     pub fn run(&self, data: &mut [f64], channels: usize) -> Result<(), MathError> {
         run_each(|_| self, data, channels)
     }
@@ -49,7 +49,7 @@ impl ZeroPhase {
 /// one design and order: they differ in their cut-offs.
 ///
 /// # Errors
-/// [`MathError::TooShort`] unless there are more samples than [`Sos::pad_samples`].
+/// [`MathError::TooShort`] unless there are more samples than [`SosFilter::pad_samples`].
 pub fn run_each<'a>(
     filter: impl Fn(usize) -> &'a ZeroPhase,
     data: &mut [f64],
@@ -66,7 +66,7 @@ pub fn run_each<'a>(
             needed: pad,
         });
     }
-    widest(Passes {
+    widest(FilterPasses {
         filter: &filter as &dyn Fn(usize) -> &'a ZeroPhase,
         data,
         channels,
@@ -80,13 +80,13 @@ const VECTORS: usize = 2;
 const MOST_LANES: usize = 8 * VECTORS;
 
 /// Both passes over all channels.
-struct Passes<'a, 'f> {
+struct FilterPasses<'a, 'f> {
     filter: &'a dyn Fn(usize) -> &'f ZeroPhase,
     data: &'a mut [f64],
     channels: usize,
 }
 
-impl LaneWork for Passes<'_, '_> {
+impl LaneWork for FilterPasses<'_, '_> {
     type Output = ();
 
     // A pass takes as long as its recursion, whether a lane is empty or not: few passes are fast.
@@ -96,7 +96,7 @@ impl LaneWork for Passes<'_, '_> {
         let sections = (self.filter)(0).sos.sections().len();
         for first in (0..self.channels).step_by(whole) {
             let width = whole.min(self.channels - first);
-            let lanes = Lanes {
+            let lanes = ChannelLanes {
                 simd,
                 filter: self.filter,
                 channels: self.channels,
@@ -116,11 +116,11 @@ impl LaneWork for Passes<'_, '_> {
 }
 
 /// One number of each channel that is filtered at once.
-type Of<S> = [<S as Simd>::f64s; VECTORS];
+type ChannelVectors<S> = [<S as Simd>::f64s; VECTORS];
 
 /// The channels `first..first + width`.
 #[derive(Clone, Copy)]
-struct Lanes<'a, 'f, S> {
+struct ChannelLanes<'a, 'f, S> {
     simd: S,
     filter: &'a dyn Fn(usize) -> &'f ZeroPhase,
     channels: usize,
@@ -128,7 +128,7 @@ struct Lanes<'a, 'f, S> {
     width: usize,
 }
 
-impl<S: Simd> Lanes<'_, '_, S> {
+impl<S: Simd> ChannelLanes<'_, '_, S> {
     /// Both passes with at most N sections; `FULL` where every lane has a channel.
     #[inline(always)]
     fn both<const N: usize, const FULL: bool>(self, data: &mut [f64]) {
@@ -144,13 +144,16 @@ impl<S: Simd> Lanes<'_, '_, S> {
         // The forward pass overwrites what the extension of the far end mirrors.
         let end = at(data, last);
         let tail = (1..=pad).map(|i| self.reflected(end, at(data, last - i)));
-        let mut tail: Vec<Of<S>> = tail.collect();
+        let mut tail: Vec<ChannelVectors<S>> = tail.collect();
 
         let start = at(data, 0);
         let sections: [Section<S>; N] = self.sections();
         let sections = &sections[..like.sos.sections().len()];
-        let mut cascade =
-            Cascade::<S, N>::settled(self.simd, sections, self.reflected(start, at(data, pad)));
+        let mut cascade = SectionCascade::<S, N>::settled(
+            self.simd,
+            sections,
+            self.reflected(start, at(data, pad)),
+        );
         for i in (1..=pad).rev() {
             cascade.step(self.reflected(start, at(data, i)));
         }
@@ -164,7 +167,7 @@ impl<S: Simd> Lanes<'_, '_, S> {
         }
 
         let from = tail.last().copied().unwrap_or(end);
-        let mut cascade = Cascade::<S, N>::settled(self.simd, sections, from);
+        let mut cascade = SectionCascade::<S, N>::settled(self.simd, sections, from);
         for x in tail.iter().rev() {
             cascade.step(*x);
         }
@@ -176,7 +179,7 @@ impl<S: Simd> Lanes<'_, '_, S> {
     }
 
     #[inline(always)]
-    fn read<const FULL: bool>(self, sample: &[f64]) -> Of<S> {
+    fn read<const FULL: bool>(self, sample: &[f64]) -> ChannelVectors<S> {
         if FULL {
             let (vectors, _) = S::as_simd_f64s(sample);
             return std::array::from_fn(|m| vectors[m]);
@@ -188,7 +191,7 @@ impl<S: Simd> Lanes<'_, '_, S> {
     }
 
     #[inline(always)]
-    fn write<const FULL: bool>(self, sample: &mut [f64], values: Of<S>) {
+    fn write<const FULL: bool>(self, sample: &mut [f64], values: ChannelVectors<S>) {
         if FULL {
             let (vectors, _) = S::as_mut_simd_f64s(sample);
             vectors.copy_from_slice(&values);
@@ -202,14 +205,14 @@ impl<S: Simd> Lanes<'_, '_, S> {
 
     /// 2 end - x.
     #[inline(always)]
-    fn reflected(self, end: Of<S>, x: Of<S>) -> Of<S> {
+    fn reflected(self, end: ChannelVectors<S>, x: ChannelVectors<S>) -> ChannelVectors<S> {
         let two = self.simd.splat_f64s(2.0);
         std::array::from_fn(|m| self.simd.sub_f64s(self.simd.mul_f64s(two, end[m]), x[m]))
     }
 
     /// A number of each channel.
     #[inline(always)]
-    fn each(self, of: impl Fn(&ZeroPhase) -> f64) -> Of<S> {
+    fn each(self, of: impl Fn(&ZeroPhase) -> f64) -> ChannelVectors<S> {
         let mut numbers = [0.0; MOST_LANES];
         for (l, number) in numbers[..self.width].iter_mut().enumerate() {
             *number = of((self.filter)(self.first + l));
@@ -237,22 +240,22 @@ impl<S: Simd> Lanes<'_, '_, S> {
 /// One section of the filters of all lanes.
 #[derive(Clone, Copy)]
 struct Section<S: Simd> {
-    b: [Of<S>; 3],
-    a: [Of<S>; 2],
-    steady: [Of<S>; 2],
+    b: [ChannelVectors<S>; 3],
+    a: [ChannelVectors<S>; 2],
+    steady: [ChannelVectors<S>; 2],
 }
 
 /// Running state of cascades of at most N sections, transposed direct form II.
-struct Cascade<'a, S: Simd, const N: usize> {
+struct SectionCascade<'a, S: Simd, const N: usize> {
     simd: S,
     sections: &'a [Section<S>],
-    state: [[Of<S>; 2]; N],
+    state: [[ChannelVectors<S>; 2]; N],
 }
 
-impl<'a, S: Simd, const N: usize> Cascade<'a, S, N> {
+impl<'a, S: Simd, const N: usize> SectionCascade<'a, S, N> {
     /// The state after a long constant input `x`.
     #[inline(always)]
-    fn settled(simd: S, sections: &'a [Section<S>], x: Of<S>) -> Self {
+    fn settled(simd: S, sections: &'a [Section<S>], x: ChannelVectors<S>) -> Self {
         let mut state = [[[simd.splat_f64s(0.0); VECTORS]; 2]; N];
         for (state, section) in state.iter_mut().zip(sections) {
             *state = section
@@ -267,11 +270,11 @@ impl<'a, S: Simd, const N: usize> Cascade<'a, S, N> {
     }
 
     #[inline(always)]
-    fn step(&mut self, mut x: Of<S>) -> Of<S> {
+    fn step(&mut self, mut x: ChannelVectors<S>) -> ChannelVectors<S> {
         let simd = self.simd;
         for (Section { b, a, .. }, [s1, s2]) in self.sections.iter().zip(&mut self.state) {
             for m in 0..VECTORS {
-                let of = |number: &Of<S>, x: S::f64s| simd.mul_f64s(number[m], x);
+                let of = |number: &ChannelVectors<S>, x: S::f64s| simd.mul_f64s(number[m], x);
                 let y = simd.add_f64s(of(&b[0], x[m]), s1[m]);
                 let next = simd.add_f64s(of(&b[1], x[m]), s2[m]);
                 s1[m] = simd.sub_f64s(next, of(&a[0], y));
@@ -312,8 +315,8 @@ mod tests {
     impl OracleCase {
         fn filter(&self, rate_hz: f64) -> ZeroPhase {
             let sos = match self.ripple_db {
-                Some(ripple) => Sos::chebyshev(self.order, ripple, self.cutoff_hz, rate_hz),
-                None => Sos::butterworth(self.order, self.cutoff_hz, rate_hz),
+                Some(ripple) => SosFilter::chebyshev(self.order, ripple, self.cutoff_hz, rate_hz),
+                None => SosFilter::butterworth(self.order, self.cutoff_hz, rate_hz),
             };
             ZeroPhase::new(sos.expect("a valid design"))
         }
@@ -362,7 +365,9 @@ mod tests {
         let value = |i: usize, c: usize| ((i * (c + 3)) as f64 * 0.05).sin() + c as f64;
         for order in [4, 5] {
             let filters: Vec<ZeroPhase> = (0..19)
-                .map(|c| Sos::butterworth(order, 10.0 + 7.0 * c as f64, 1000.0).expect("valid"))
+                .map(|c| {
+                    SosFilter::butterworth(order, 10.0 + 7.0 * c as f64, 1000.0).expect("valid")
+                })
                 .map(ZeroPhase::new)
                 .collect();
             for channels in 1..=19 {
@@ -382,7 +387,7 @@ mod tests {
 
     #[test]
     fn a_straight_line_passes_unchanged() {
-        let filter = ZeroPhase::new(Sos::butterworth(4, 20.0, 1000.0).expect("valid"));
+        let filter = ZeroPhase::new(SosFilter::butterworth(4, 20.0, 1000.0).expect("valid"));
         let line: Vec<f64> = (0..2000).map(|i| 3.0 - 0.01 * i as f64).collect();
         let mut data = line.clone();
         filter.run(&mut data, 1).expect("long enough");
@@ -394,7 +399,7 @@ mod tests {
 
     #[test]
     fn a_signal_shorter_than_its_extension_is_refused() {
-        let filter = ZeroPhase::new(Sos::butterworth(4, 20.0, 1000.0).expect("valid"));
+        let filter = ZeroPhase::new(SosFilter::butterworth(4, 20.0, 1000.0).expect("valid"));
         let mut data = vec![1.0; 15];
         assert_eq!(
             filter.run(&mut data, 1),
@@ -409,18 +414,18 @@ mod tests {
     #[test]
     fn what_no_filter_can_do_is_an_error() {
         assert!(matches!(
-            Sos::butterworth(0, 1.0, 100.0),
+            SosFilter::butterworth(0, 1.0, 100.0),
             Err(MathError::FilterOrder { order: 0 })
         ));
-        assert!(Sos::butterworth(17, 1.0, 100.0).is_err());
-        let message = Sos::butterworth(4, 60.0, 100.0)
+        assert!(SosFilter::butterworth(17, 1.0, 100.0).is_err());
+        let message = SosFilter::butterworth(4, 60.0, 100.0)
             .expect_err("above Nyquist")
             .to_string();
         assert!(
             message.contains("more than 120 Hz, found 100 Hz"),
             "{message}"
         );
-        assert!(Sos::butterworth(4, f64::NAN, 100.0).is_err());
-        assert!(Sos::chebyshev(4, 0.0, 10.0, 100.0).is_err());
+        assert!(SosFilter::butterworth(4, f64::NAN, 100.0).is_err());
+        assert!(SosFilter::chebyshev(4, 0.0, 10.0, 100.0).is_err());
     }
 }

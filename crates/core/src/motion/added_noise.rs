@@ -5,10 +5,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::MotionError;
-use super::settings::Parallel;
+use super::settings::FilterDesign;
 use super::stretch::Stretch;
 
-impl Parallel {
+impl FilterDesign {
     /// The stretch with white noise of its own positions' level, times `sign`, added to them. In the mean over both
     /// signs what is of first order in the noise is gone, and what is of second is there twice
     /// (Cook and Stefanski, J. Am. Stat. Assoc. 89, 1994). Velocity and acceleration get the noise as
@@ -116,7 +116,7 @@ mod tests {
                 q_cutoff_hz: Some(hz),
                 ..FilterSettings::default()
             };
-            let parallel = Parallel::design(&settings, dt).unwrap();
+            let parallel = FilterDesign::design(&settings, dt).unwrap();
             let motion = |k: usize| {
                 let t = k as f64 * dt;
                 0.4 * (1.7 * t).sin() + 0.05 * (9.1 * t).sin()
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn what_holds_no_noise_gets_none() {
-        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
+        let parallel = FilterDesign::design(&FilterSettings::default(), 1e-3).unwrap();
         let still = Stretch {
             dt: 1e-3,
             t: vec![0.0; 3000],

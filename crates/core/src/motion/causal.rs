@@ -9,8 +9,8 @@ use super::settings::FilterSettings;
 use super::time_base::{Event, SampleClock, TimeBase};
 use super::{MotionError, MotionSample};
 use crate::block::Block;
-use crate::math::causal::{Causal, delay_samples};
-use crate::math::sos::Sos;
+use crate::math::causal::{CausalSections, delay_samples};
+use crate::math::sos::SosFilter;
 
 /// Rows from which the sampling step is found.
 const CLOCK_ROWS: usize = 256;
@@ -34,7 +34,7 @@ pub struct CausalMotion {
 /// The filter of positions and torques for one sampling step.
 pub struct CausalFilter {
     /// None where raw positions are differentiated.
-    pub sos: Option<Sos>,
+    pub sos: Option<SosFilter>,
     /// Rows before the first sample.
     pub settle: usize,
     /// Time by which samples are late, the differences' own included \[s\].
@@ -55,7 +55,7 @@ impl CausalFilter {
         let filter = PositionFilter::design(settings.q_order, cutoffs, rate)?;
         let sos = filter.map(|f| f.narrowest().sos().clone());
         let late = sos.as_ref().map_or(0.0, delay_samples) + LATE_SAMPLES as f64;
-        let settle = |sos: &Sos| sos.settle_samples(SETTLING_TIME_CONSTANTS);
+        let settle = |sos: &SosFilter| sos.settle_samples(SETTLING_TIME_CONSTANTS);
         Ok(Self {
             settle: sos.as_ref().map_or(0, settle) + POINTS,
             delay_s: late * dt,
@@ -70,7 +70,7 @@ struct Chain {
     delay_s: f64,
     settle: usize,
     /// Of positions and torques of all joints alike, or they would not belong together.
-    filter: Causal,
+    filter: CausalSections,
     /// Filtered positions, then torques, of the newest samples, the newest at `at`.
     ring: Vec<f64>,
     at: usize,
@@ -152,7 +152,7 @@ impl Chain {
             dt,
             delay_s: of.delay_s,
             settle: of.settle,
-            filter: Causal::new(of.sos.as_ref(), 2 * joints),
+            filter: CausalSections::new(of.sos.as_ref(), 2 * joints),
             ring: vec![0.0; 2 * joints * POINTS],
             at: 0,
             count: 0,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::settings::Parallel;
+use super::settings::FilterDesign;
 use super::time_base::Event;
 use super::window::FilterWindow;
 
@@ -11,7 +11,7 @@ const LISTED: usize = 20;
 
 /// Stretches of a log that were too short to filter.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Skipped {
+pub struct SkippedStretches {
     pub segments: usize,
     /// Their samples together.
     pub samples: u64,
@@ -21,7 +21,7 @@ pub struct Skipped {
 
 /// Cuts the segments of a log into windows.
 pub(super) struct WindowCutter {
-    pub chain: Arc<Parallel>,
+    pub chain: Arc<FilterDesign>,
     joints: usize,
     /// Samples of the segment in work, from index `first` of the segment on.
     t: Vec<f64>,
@@ -34,14 +34,14 @@ pub(super) struct WindowCutter {
     pub segments: usize,
     /// Samples of the longest stretch, used or not.
     pub longest: usize,
-    pub skipped: Skipped,
+    pub skipped: SkippedStretches,
     /// Windows, the first `ready` of them cut and not yet run.
     pub windows: Vec<FilterWindow>,
     pub ready: usize,
 }
 
 impl WindowCutter {
-    pub fn new(chain: Parallel, joints: usize) -> Self {
+    pub fn new(chain: FilterDesign, joints: usize) -> Self {
         Self {
             chain: Arc::new(chain),
             joints,
@@ -52,7 +52,7 @@ impl WindowCutter {
             core: 0,
             segments: 0,
             longest: 0,
-            skipped: Skipped::default(),
+            skipped: SkippedStretches::default(),
             windows: Vec::new(),
             ready: 0,
         }

@@ -3,7 +3,7 @@
 //! Coefficients: Fornberg (1988), centred formulas. At a segment's ends the formula shortens with
 //! the room that is left.
 
-use super::settings::Differences;
+use super::settings::DifferenceFormula;
 
 /// Weights of q[k+m] - q[k-m], m = 1.., for the first derivative, by half width.
 const FIRST: [&[f64]; 4] = [
@@ -21,12 +21,12 @@ const SECOND: [&[f64]; 4] = [
     &[8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0],
 ];
 
-impl Differences {
+impl DifferenceFormula {
     /// Samples to each side that a value depends on.
     pub(super) fn reach(self) -> usize {
         match self {
-            Differences::Central => 2,
-            Differences::HighOrder => 4,
+            DifferenceFormula::Central => 2,
+            DifferenceFormula::HighOrder => 4,
         }
     }
 
@@ -40,11 +40,11 @@ impl Differences {
             return;
         }
         match self {
-            Differences::Central => {
+            DifferenceFormula::Central => {
                 gradient(q, joints, dt, v);
                 gradient(v, joints, dt, a);
             }
-            Differences::HighOrder => high_order(q, joints, dt, v, a),
+            DifferenceFormula::HighOrder => high_order(q, joints, dt, v, a),
         }
     }
 }
@@ -138,7 +138,7 @@ mod tests {
         for degree in 2..=8 {
             let [q, v0, a0] = polynomial(degree, dt, 15);
             let (mut v, mut a) = (vec![0.0; 15], vec![0.0; 15]);
-            Differences::HighOrder.apply(&q, 1, dt, &mut v, &mut a);
+            DifferenceFormula::HighOrder.apply(&q, 1, dt, &mut v, &mut a);
             for k in 4..11 {
                 assert!((v[k] - v0[k]).abs() < 1e-13, "degree {degree}: {}", v[k]);
                 assert!((a[k] - a0[k]).abs() < 1e-11, "degree {degree}: {}", a[k]);
@@ -152,7 +152,7 @@ mod tests {
         for samples in 3..14 {
             let [q, v0, a0] = polynomial(2, dt, samples);
             let (mut v, mut a) = (vec![0.0; samples], vec![0.0; samples]);
-            Differences::HighOrder.apply(&q, 1, dt, &mut v, &mut a);
+            DifferenceFormula::HighOrder.apply(&q, 1, dt, &mut v, &mut a);
             for k in 0..samples {
                 assert!((v[k] - v0[k]).abs() < 1e-13, "{samples} samples, {k}");
                 assert!((a[k] - a0[k]).abs() < 1e-10, "{samples} samples, {k}");
@@ -164,7 +164,7 @@ mod tests {
     fn central_differences_are_taken_twice() {
         let q = [0.0, 1.0, 4.0, 9.0, 16.0, 26.0];
         let (mut v, mut a) = ([0.0; 6], [0.0; 6]);
-        Differences::Central.apply(&q, 1, 1.0, &mut v, &mut a);
+        DifferenceFormula::Central.apply(&q, 1, 1.0, &mut v, &mut a);
         assert_eq!(v, [1.0, 2.0, 4.0, 6.0, 8.5, 10.0]);
         assert_eq!(a, [1.0, 1.5, 2.0, 2.25, 2.0, 1.5]);
     }
@@ -174,7 +174,7 @@ mod tests {
         let dt = 0.01;
         let samples = 20;
         let x = |k: usize, j: usize| ((k * (j + 1)) as f64 * 0.1).sin();
-        for kind in [Differences::Central, Differences::HighOrder] {
+        for kind in [DifferenceFormula::Central, DifferenceFormula::HighOrder] {
             let q: Vec<f64> = (0..samples * 3).map(|i| x(i / 3, i % 3)).collect();
             let (mut v, mut a) = (vec![0.0; 60], vec![0.0; 60]);
             kind.apply(&q, 3, dt, &mut v, &mut a);
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn two_samples_have_no_derivative() {
         let (mut v, mut a) = ([1.0; 2], [1.0; 2]);
-        Differences::HighOrder.apply(&[0.0, 1.0], 1, 0.1, &mut v, &mut a);
+        DifferenceFormula::HighOrder.apply(&[0.0, 1.0], 1, 0.1, &mut v, &mut a);
         assert_eq!((v, a), ([0.0; 2], [0.0; 2]));
     }
 }

@@ -11,7 +11,7 @@ use crate::block::Block;
 
 /// Motion at the rows of a record; matrices are `k x joints` row-major.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Smooth {
+pub struct FullRateMotion {
     /// Sampling step (s).
     pub dt: f64,
     /// Smoothed positions [m or rad].
@@ -54,7 +54,7 @@ pub fn full_rate(
     q: &[f64],
     joints: usize,
     settings: &FilterSettings,
-) -> Result<Smooth, MotionError> {
+) -> Result<FullRateMotion, MotionError> {
     if joints == 0 || q.len() != t.len() * joints {
         return Err(MotionError::Shape {
             channel: "q",
@@ -84,7 +84,7 @@ pub fn full_rate(
     let edge = edge(settings, filter.as_ref(), dt)? as f64 * dt;
     let from = t.partition_point(|x| *x < t[0] + edge);
     let to = t.partition_point(|x| *x <= t[t.len() - 1] - edge);
-    Ok(Smooth {
+    Ok(FullRateMotion {
         dt,
         q: grid_q,
         v,

@@ -33,10 +33,10 @@ mod window;
 mod zero_order_hold;
 
 pub use causal::{CausalFilter, CausalMotion, CausalSample};
-pub use cutter::Skipped;
-pub use full_rate::{Smooth, full_rate, segments};
+pub use cutter::SkippedStretches;
+pub use full_rate::{FullRateMotion, full_rate, segments};
 pub use run::{RunError, Summary, run};
-pub use settings::{Differences, FilterSettings, Parallel, ParallelFilter, TorqueTiming};
+pub use settings::{DifferenceFormula, FilterDesign, FilterSettings, ParallelFilter, TorqueTiming};
 pub(crate) use stretch::alike;
 pub use stretch::{ParallelFilters, Stretch, stretches};
 pub use zero_order_hold::ZeroOrderHold;

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::added_noise::middle_roughness;
 use super::position_filter::HIGHEST_SHARE;
-use super::settings::{FilterSettings, Parallel};
+use super::settings::{FilterDesign, FilterSettings};
 use super::stretch::Stretch;
 use super::{MotionError, rest};
 
@@ -71,7 +71,7 @@ pub fn candidates(settings: &FilterSettings, rate_hz: f64) -> Vec<f64> {
 
 /// Squares of one joint under one cut-off.
 #[derive(Debug, Clone, Copy, Default)]
-struct Squares {
+struct CutoffSquares {
     /// By the narrower filter, which takes noise too.
     change: f64,
     noise: f64,
@@ -91,7 +91,7 @@ pub struct CutoffTrial<'a> {
     /// Speed up to which each joint rests [m/s or rad/s].
     rest_speed: &'a [f64],
     /// `[joint][cut-off]`
-    squares: Vec<Vec<Squares>>,
+    squares: Vec<Vec<CutoffSquares>>,
 }
 
 impl<'a> CutoffTrial<'a> {
@@ -104,7 +104,7 @@ impl<'a> CutoffTrial<'a> {
     ) -> Self {
         CutoffTrial {
             settings,
-            squares: vec![vec![Squares::default(); cutoffs_hz.len()]; rest_speed.len()],
+            squares: vec![vec![CutoffSquares::default(); cutoffs_hz.len()]; rest_speed.len()],
             cutoffs_hz,
             friction,
             rest_speed,
@@ -119,16 +119,16 @@ impl<'a> CutoffTrial<'a> {
     pub fn add(&mut self, stretch: &Stretch) -> Result<(), MotionError> {
         let design = |cutoff: f64| {
             let settings = self.settings.with_one_position_filter(cutoff);
-            Parallel::design(&settings, stretch.dt)
+            FilterDesign::design(&settings, stretch.dt)
         };
         let pair = |hz: &f64| Ok([design(*hz)?, design(NARROWER * hz)?]);
         let designs = self.cutoffs_hz.iter().map(pair);
         let designs = designs.collect::<Result<Vec<_>, MotionError>>()?;
-        let edge = designs.iter().flatten().filter_map(Parallel::unsettled);
+        let edge = designs.iter().flatten().filter_map(FilterDesign::unsettled);
         let edge = edge.max().unwrap_or(0);
         let kept = stretch.len().saturating_sub(2 * edge);
         // the edges of the stretch are left off already
-        let shortest = |d: &Parallel| d.shortest - 2 * d.edge;
+        let shortest = |d: &FilterDesign| d.shortest - 2 * d.edge;
         if designs.iter().flatten().any(|d| kept < shortest(d)) {
             return Ok(());
         }
@@ -163,7 +163,7 @@ impl<'a> CutoffTrial<'a> {
 
     /// What each cut-off costs each joint, `[joint][cut-off]`; nothing for a joint that never moves.
     pub fn costs(&self) -> Vec<Vec<CutoffCost>> {
-        let cost = |(cutoff_hz, s): (&f64, &Squares)| CutoffCost {
+        let cost = |(cutoff_hz, s): (&f64, &CutoffSquares)| CutoffCost {
             cutoff_hz: *cutoff_hz,
             smear: ((s.change - s.noise).max(0.0) / s.rows as f64).sqrt(),
             noise: (s.noise / s.rows as f64).sqrt(),
@@ -173,7 +173,7 @@ impl<'a> CutoffTrial<'a> {
                 false => 0.0,
             },
         };
-        let of_joint = |squares: &Vec<Squares>| {
+        let of_joint = |squares: &Vec<CutoffSquares>| {
             let pairs = self.cutoffs_hz.iter().zip(squares);
             pairs.filter(|(_, s)| s.rows > 0).map(cost).collect()
         };
@@ -204,14 +204,14 @@ impl OneJoint<'_> {
     }
 
     /// Velocity and acceleration through the position filter of a design.
-    fn smoothed(&self, design: &Parallel) -> Result<[Vec<f64>; 2], MotionError> {
+    fn smoothed(&self, design: &FilterDesign) -> Result<[Vec<f64>; 2], MotionError> {
         let q = self.stretch.q[self.joint].clone();
         let [_, v, a] = design.motion_of(self.joint, q, self.stretch.dt)?;
         Ok([v, a])
     }
 
     /// Whether the joint moves in each row.
-    fn moves(&self, design: &Parallel) -> Result<Vec<bool>, MotionError> {
+    fn moves(&self, design: &FilterDesign) -> Result<Vec<bool>, MotionError> {
         let [v, _] = self.smoothed(design)?;
         let speeds = self.inner(&v).iter();
         let moving: Vec<f64> = speeds
@@ -223,9 +223,9 @@ impl OneJoint<'_> {
 
     fn add(
         &self,
-        [design, narrower]: &[Parallel; 2],
+        [design, narrower]: &[FilterDesign; 2],
         moves: &[bool],
-        sum: &mut Squares,
+        sum: &mut CutoffSquares,
     ) -> Result<(), MotionError> {
         let [v, a] = self.smoothed(design)?;
         let mut again = v.clone();
@@ -262,7 +262,7 @@ impl OneJoint<'_> {
     }
 }
 
-impl Parallel {
+impl FilterDesign {
     /// Samples at a stretch's end in which the position filter has not settled.
     fn unsettled(&self) -> Option<usize> {
         let filter = self.position.as_ref()?;
@@ -360,7 +360,7 @@ mod tests {
                 let off: Vec<f64> = (smooth.v.iter().zip(&v))
                     .map(|(s, v)| f(*s) - f(*v))
                     .collect();
-                let parallel = Parallel::design(&settings, DT).unwrap();
+                let parallel = FilterDesign::design(&settings, DT).unwrap();
                 let rows = parallel.run(&[&off[500..off.len() - 500]]).unwrap();
                 (rows[0].iter().map(|x| x * x).sum::<f64>() / rows[0].len() as f64).sqrt()
             };

@@ -1,7 +1,7 @@
 //! The filter that positions come through before they are differentiated: one for all joints, or one for each.
 
 use super::MotionError;
-use crate::math::sos::Sos;
+use crate::math::sos::SosFilter;
 use crate::math::zero_phase::{ZeroPhase, run_each};
 
 /// A position cut-off that is not asked for stays below this share of the sampling rate.
@@ -28,7 +28,7 @@ impl PositionFilter {
         if order == 0 {
             return Ok(None);
         }
-        let design = |cutoff: &f64| Sos::butterworth(order, *cutoff, rate);
+        let design = |cutoff: &f64| SosFilter::butterworth(order, *cutoff, rate);
         let filters = cutoffs
             .iter()
             .map(|cutoff| Ok(ZeroPhase::new(design(cutoff)?)))

@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::cutter::{Skipped, WindowCutter};
-use super::settings::{FilterSettings, Parallel};
+use super::cutter::{SkippedStretches, WindowCutter};
+use super::settings::{FilterDesign, FilterSettings};
 use super::time_base::TimeBase;
 use super::window::FilterWindow;
 use super::{FilteredRow, MotionError, MotionSample};
@@ -44,7 +44,7 @@ pub struct Summary {
     pub segments: usize,
     /// Stretches too short to filter.
     #[serde(skip)]
-    pub skipped: Skipped,
+    pub skipped: SkippedStretches,
     /// Samples interpolated because no row lay within 2 % of a step from their time.
     #[serde(skip)]
     pub interpolated: u64,
@@ -78,7 +78,7 @@ pub fn run<E>(
     fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
     sink: &mut dyn FnMut(&FilteredRow<'_>),
 ) -> Result<Summary, RunError<E>> {
-    let mut intake = Intake::new(joints, settings, rate_hz)?;
+    let mut intake = RowIntake::new(joints, settings, rate_hz)?;
     let mut batch: Vec<FilterWindow> = Vec::new();
     let (mut waiting, mut rows, mut more) = (0, 0, true);
     while more || waiting > 0 {
@@ -114,7 +114,7 @@ pub fn run<E>(
 }
 
 /// What is between the source and the windows.
-struct Intake<'a> {
+struct RowIntake<'a> {
     settings: &'a FilterSettings,
     joints: usize,
     block: Block,
@@ -125,7 +125,7 @@ struct Intake<'a> {
     span: Option<[f64; 2]>,
 }
 
-impl<'a> Intake<'a> {
+impl<'a> RowIntake<'a> {
     fn new(
         joints: usize,
         settings: &'a FilterSettings,
@@ -172,7 +172,7 @@ impl<'a> Intake<'a> {
             let cutter = match &mut self.cutter {
                 Some(cutter) => cutter,
                 none => none.insert(WindowCutter::new(
-                    Parallel::design(self.settings, clock.dt)?,
+                    FilterDesign::design(self.settings, clock.dt)?,
                     self.joints,
                 )),
             };

@@ -5,7 +5,7 @@ use super::position_filter::{HIGHEST_SHARE, PositionFilter};
 use super::rest::response;
 use super::thinning::{self, TorqueThinner};
 use crate::math::kept::KeptEvery;
-use crate::math::sos::Sos;
+use crate::math::sos::SosFilter;
 use crate::math::zero_phase::ZeroPhase;
 
 /// Time constants of the position filter by which windows overlap: derivatives take up to 1 / step^2 of what is left.
@@ -32,7 +32,7 @@ pub struct FilterSettings {
     /// Order of the (Butterworth) position filter; 0 differentiates raw positions.
     pub q_order: usize,
     /// How positions are differentiated.
-    pub differences: Differences,
+    pub differences: DifferenceFormula,
     /// At which time a logged torque acts.
     pub torque: TorqueTiming,
     /// A step longer than this many sampling steps splits the log ..
@@ -64,7 +64,7 @@ impl Default for FilterSettings {
             q_cutoff_hz: None,
             joint_q_cutoffs_hz: Vec::new(),
             q_order: 4,
-            differences: Differences::HighOrder,
+            differences: DifferenceFormula::HighOrder,
             torque: TorqueTiming::Sampled,
             gap_factor: 2.5,
             bridge_s: 0.0,
@@ -104,7 +104,7 @@ pub enum ParallelFilter {
 
 /// Difference formula for velocity and acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Differences {
+pub enum DifferenceFormula {
     /// Three points, once for the velocity and once for the acceleration.
     Central,
     /// Nine points, exact for polynomials of degree 8 (velocity) and 9 (acceleration).
@@ -123,10 +123,10 @@ pub enum TorqueTiming {
 
 /// The declared filters, the parallel one among them, and lengths for one sampling step.
 #[derive(Debug, Clone)]
-pub struct Parallel {
+pub struct FilterDesign {
     /// Sampling step (s).
     pub(super) dt: f64,
-    pub(super) differences: Differences,
+    pub(super) differences: DifferenceFormula,
     pub(super) position: Option<PositionFilter>,
     pub(super) parallel: ZeroPhase,
     /// The same for the samples that are left, of which the rows are kept.
@@ -199,7 +199,7 @@ impl FilterSettings {
     }
 }
 
-impl Parallel {
+impl FilterDesign {
     /// The filters for one sampling step [s].
     ///
     /// # Errors
@@ -216,10 +216,10 @@ impl Parallel {
         let decimation = settings.decimation_at(dt);
         let parallel_at = |rate: f64| match settings.filter {
             ParallelFilter::Butterworth { order } => {
-                Sos::butterworth(order, settings.cutoff_hz, rate)
+                SosFilter::butterworth(order, settings.cutoff_hz, rate)
             }
             ParallelFilter::Chebyshev { order, ripple_db } => {
-                Sos::chebyshev(order, ripple_db, settings.cutoff_hz, rate)
+                SosFilter::chebyshev(order, ripple_db, settings.cutoff_hz, rate)
             }
         };
         let parallel = parallel_at(rate)?;
@@ -233,7 +233,7 @@ impl Parallel {
         let edge = edge(settings, position.as_ref(), dt)?;
         let trim = samples_of("trim_s", settings.trim_s, dt)?
             .unwrap_or_else(|| parallel.settle_samples(3.0));
-        let pad = |sos: &Sos| sos.pad_samples() + 1;
+        let pad = |sos: &SosFilter| sos.pad_samples() + 1;
         let position_pad = position.as_ref().map_or(0, |f| pad(f.narrowest().sos()));
         // An artificial end must cost at least what a segment's end does, or a middle window
         // would keep samples that the whole segment drops.

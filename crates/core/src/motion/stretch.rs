@@ -2,7 +2,7 @@
 //! times: whole in memory, 8 bytes x 4 channels x joints a sample.
 
 use super::run::{RunError, Summary, run};
-use super::settings::{FilterSettings, Parallel};
+use super::settings::{FilterDesign, FilterSettings};
 use super::{MotionError, rest};
 use crate::block::Block;
 use crate::math::kept::{KeptRows, KeptWork};
@@ -100,7 +100,7 @@ impl Stretch {
 }
 
 /// Reads one log into stretches. They end where the parallel filter begins: what it leaves off at
-/// the ends is [`Parallel::trim`].
+/// the ends is [`FilterDesign::trim`].
 pub fn stretches<E>(
     log: usize,
     joints: usize,
@@ -159,7 +159,7 @@ pub fn stretches<E>(
         stretch.began -= first.unwrap_or(0.0);
     }
     // what was done to the log is reported with its own decimation
-    let decimation = Parallel::design(settings, summary.dt)?.decimation;
+    let decimation = FilterDesign::design(settings, summary.dt)?.decimation;
     let summary = Summary {
         decimation,
         ..summary
@@ -167,7 +167,7 @@ pub fn stretches<E>(
     Ok((found, summary))
 }
 
-impl Parallel {
+impl FilterDesign {
     /// What each sample of a joint weighs that rests up to `rest_speed`, as in [`MotionSample`](super::MotionSample).
     pub fn weights(&self, stretch: &Stretch, joint: usize, rest_speed: f64) -> Vec<f64> {
         let cutoff = self.position.as_ref().map(|f| f.cutoff_hz(joint));
@@ -235,7 +235,7 @@ const ALIKE: f64 = 0.02;
 #[derive(Debug, Clone)]
 pub struct ParallelFilters {
     /// Sampling step \[s\] and the filter for it.
-    designs: Vec<(f64, Parallel)>,
+    designs: Vec<(f64, FilterDesign)>,
 }
 
 impl ParallelFilters {
@@ -244,10 +244,10 @@ impl ParallelFilters {
     /// # Errors
     /// [`MotionError`] for settings that one of the sampling rates does not carry.
     pub fn design(settings: &FilterSettings, stretches: &[Stretch]) -> Result<Self, MotionError> {
-        let mut designs: Vec<(f64, Parallel)> = Vec::new();
+        let mut designs: Vec<(f64, FilterDesign)> = Vec::new();
         for dt in stretches.iter().rev().map(|s| s.dt) {
             if !designs.iter().any(|(known, _)| alike(*known, dt)) {
-                designs.push((dt, Parallel::design(settings, dt)?));
+                designs.push((dt, FilterDesign::design(settings, dt)?));
             }
         }
         if designs.is_empty() {
@@ -266,18 +266,18 @@ impl ParallelFilters {
     }
 
     /// The filter for a stretch.
-    pub fn of(&self, stretch: &Stretch) -> &Parallel {
+    pub fn of(&self, stretch: &Stretch) -> &FilterDesign {
         &self.designs[self.rate_of(stretch)].1
     }
 
     /// Sampling step \[s\] and filter of each rate.
-    pub(crate) fn designs(&self) -> &[(f64, Parallel)] {
+    pub(crate) fn designs(&self) -> &[(f64, FilterDesign)] {
         &self.designs
     }
 
     /// Rows per second where most are kept \[Hz\].
     pub fn row_rate_hz(&self) -> f64 {
-        let rate = |(dt, filter): &(f64, Parallel)| 1.0 / (dt * filter.decimation as f64);
+        let rate = |(dt, filter): &(f64, FilterDesign)| 1.0 / (dt * filter.decimation as f64);
         self.designs.iter().map(rate).fold(0.0, f64::max)
     }
 }

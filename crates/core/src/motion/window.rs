@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use super::settings::Parallel;
+use super::settings::FilterDesign;
 use super::thinning::TorqueThinner;
 use super::{FilteredRow, MotionError, MotionSample, rest};
 use crate::math::kept::{KeptRows, KeptWork};
@@ -47,7 +47,7 @@ pub(super) struct FilterWindow {
 impl FilterWindow {
     pub fn process(
         &mut self,
-        chain: &Parallel,
+        chain: &FilterDesign,
         joints: usize,
         channels: usize,
         fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
@@ -93,7 +93,7 @@ impl FilterWindow {
     /// Keeps every so many samples of a span, counted as the rows are; how many they are.
     fn thin(
         &mut self,
-        chain: &Parallel,
+        chain: &FilterDesign,
         thinner: &TorqueThinner,
         joints: usize,
         span: std::ops::Range<usize>,
@@ -134,7 +134,7 @@ impl FilterWindow {
     }
 
     /// Weighs the samples of every joint, and sees which of them rest.
-    fn weigh(&mut self, chain: &Parallel, joints: usize) {
+    fn weigh(&mut self, chain: &FilterDesign, joints: usize) {
         self.weight.clear();
         self.weight.resize(self.t.len() * joints, 1.0);
         self.rests.clear();
@@ -159,7 +159,7 @@ impl FilterWindow {
     fn filter(
         &mut self,
         work: &mut KeptWork,
-        chain: &Parallel,
+        chain: &FilterDesign,
         span: std::ops::Range<usize>,
         (joints, channels): (usize, usize),
         fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
@@ -203,7 +203,7 @@ impl FilterWindow {
     }
 
     /// Every m-th sample of the core, counted from where the segment's parallel filter starts, and none within the trim.
-    fn choose_rows(&mut self, chain: &Parallel, samples: usize) {
+    fn choose_rows(&mut self, chain: &FilterDesign, samples: usize) {
         let lowest = chain.edge + chain.trim;
         let highest = if self.ends {
             (self.first + samples).saturating_sub(lowest)

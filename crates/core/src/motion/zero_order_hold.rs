@@ -54,11 +54,11 @@ mod tests {
     use super::*;
     use crate::robot::JointKind;
     use crate::robot::cft::actuation::forces_to_torques;
-    use crate::robot::cft::{Setup, Structure};
+    use crate::robot::cft::{LaboratorySetup, ParameterStructure};
 
     #[test]
     fn constant_forces_are_the_torque_of_the_row_s_own_pose() {
-        let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+        let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
         let force = [-250.0, 60.0, 3.0, 40.0];
         let mut block = Block::default();
         for k in 0..5 {

@@ -8,7 +8,7 @@ use super::joint::JointKind;
 use super::standard::{STANDARD, pseudo_inertia};
 use super::tree::base;
 use super::tree::newton_euler::walk;
-use super::{Form, Robot};
+use super::{DynamicsForm, Robot};
 
 /// How a robot's inertial parameters follow from links and drives.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +39,7 @@ impl Robot {
         let (first, count) = (STANDARD * links.len(), self.standard_parameters());
         let mut matrix = DMatrix::zeros(self.parameters().len(), count);
         match &self.0.form {
-            Form::Recursion(parameters) => {
+            DynamicsForm::Recursion(parameters) => {
                 for (row, grouping) in parameters.groupings().iter().enumerate() {
                     matrix[(row, grouping.kept)] = 1.0;
                     for (index, c) in &grouping.terms {
@@ -47,7 +47,7 @@ impl Robot {
                     }
                 }
             }
-            Form::Report(_) => {
+            DynamicsForm::Report(_) => {
                 for column in 0..count {
                     let mut unit = [0.0; STANDARD];
                     unit[column % STANDARD] = 1.0;
@@ -60,7 +60,7 @@ impl Robot {
                 }
             }
             // one moving body: all that shows is its mass, or its moment about the axis
-            Form::Inertia => matrix[(0, self.shown())] = 1.0,
+            DynamicsForm::Inertia => matrix[(0, self.shown())] = 1.0,
         }
         StandardMap {
             links: links.iter().map(|l| l.name.clone()).collect(),
@@ -83,8 +83,8 @@ impl Robot {
     /// # Panics
     /// Where there are fewer than [`Self::standard_parameters`] numbers.
     pub fn base_of(&self, standard: &[f64]) -> Vec<f64> {
-        if let Form::Recursion(parameters) = &self.0.form {
-            let sum = |g: &base::Grouping| {
+        if let DynamicsForm::Recursion(parameters) = &self.0.form {
+            let sum = |g: &base::ParameterGroup| {
                 let rest: f64 = g.terms.iter().map(|(i, c)| c * standard[*i]).sum();
                 standard[g.kept] + rest
             };
@@ -101,10 +101,10 @@ impl Robot {
     pub fn link_parameters(&self, theta: &[f64]) -> Vec<[f64; STANDARD]> {
         let mut bodies = vec![[0.0; STANDARD]; self.tree().links().len()];
         match &self.0.form {
-            Form::Inertia => {
+            DynamicsForm::Inertia => {
                 bodies[0][self.shown()] = theta.first().copied().unwrap_or_default();
             }
-            Form::Report(_) => {
+            DynamicsForm::Report(_) => {
                 let mut full = [0.0; 22];
                 // the report's structure is the full one with the last ten at 0
                 for (out, theta) in full.iter_mut().zip(theta) {
@@ -113,7 +113,7 @@ impl Robot {
                 let links = linkage::links_of(&full);
                 return links.iter().map(PseudoInertia::standard).collect();
             }
-            Form::Recursion(parameters) => {
+            DynamicsForm::Recursion(parameters) => {
                 for (grouping, value) in parameters.groupings().iter().zip(theta) {
                     if let Some(body) = bodies.get_mut(grouping.kept / STANDARD) {
                         body[grouping.kept % STANDARD] = *value;
@@ -140,8 +140,8 @@ impl Robot {
     /// Inertia, viscous and Coulomb part of each coupling by these inertial parameters.
     pub fn coupling_parameters(&self, theta: &[f64]) -> Vec<[f64; 3]> {
         match &self.0.form {
-            Form::Recursion(parameters) => parameters.of_couplings(theta),
-            Form::Inertia | Form::Report(_) => Vec::new(),
+            DynamicsForm::Recursion(parameters) => parameters.of_couplings(theta),
+            DynamicsForm::Inertia | DynamicsForm::Report(_) => Vec::new(),
         }
     }
 
@@ -166,7 +166,7 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::cft::{Setup, Structure};
+    use crate::robot::cft::{LaboratorySetup, ParameterStructure};
     use crate::robot::standard::Body;
 
     /// In a vertical plane.
@@ -241,7 +241,7 @@ mod tests {
         let links: [[f64; STANDARD]; linkage::LINKS] =
             std::array::from_fn(|i| link(i as f64).standard());
         let pseudo = links.map(|link| PseudoInertia(pseudo_inertia(&link).into()));
-        let robot = Robot::cft(Setup::default(), Structure::Full22);
+        let robot = Robot::cft(LaboratorySetup::default(), ParameterStructure::Full22);
         let standard = nalgebra::DVector::from_column_slice(links.as_flattened());
         let found = robot.standard_map().matrix * standard;
         for (a, b) in found.iter().zip(base_parameters(&pseudo)) {

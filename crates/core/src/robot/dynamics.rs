@@ -1,23 +1,23 @@
 //! M and C v + G of a robot with given parameters: what a simulation solves for accelerations.
 
-use super::cft::dynamics::{Coefficients, inertia_and_bias, solve_positive};
+use super::cft::dynamics::{ReportCoefficients, inertia_and_bias, solve_positive};
 use super::cft::{EXTENDED, PRINTED};
 use super::tree::MOST_JOINTS;
-use super::{Form, Robot};
+use super::{DynamicsForm, Robot};
 
 /// A robot with its inertial parameters, ready for many states.
 #[derive(Debug, Clone)]
-pub struct Dynamics {
+pub struct RobotDynamics {
     robot: Robot,
     theta: Vec<f64>,
     /// The coefficients of the closed form, where there is one.
-    closed: Option<Coefficients>,
+    closed: Option<ReportCoefficients>,
 }
 
 impl Robot {
     /// The dynamics with inertial parameters in the order of [`Robot::parameters`].
-    pub fn dynamics(&self, theta: &[f64]) -> Dynamics {
-        Dynamics {
+    pub fn dynamics(&self, theta: &[f64]) -> RobotDynamics {
+        RobotDynamics {
             robot: self.clone(),
             theta: theta.to_vec(),
             closed: self.coefficients(theta),
@@ -25,19 +25,19 @@ impl Robot {
     }
 
     /// The coefficients of the report's closed forms, of the robot that it is about.
-    pub fn coefficients(&self, theta: &[f64]) -> Option<Coefficients> {
-        let Form::Report(_) = self.0.form else {
+    pub fn coefficients(&self, theta: &[f64]) -> Option<ReportCoefficients> {
+        let DynamicsForm::Report(_) = self.0.form else {
             return None;
         };
         if let Ok(theta) = <&[f64; EXTENDED.len()]>::try_from(theta) {
-            return Some(Coefficients::from_theta22(theta));
+            return Some(ReportCoefficients::from_theta22(theta));
         }
         let theta = <&[f64; PRINTED]>::try_from(theta).ok()?;
-        Some(Coefficients::from_theta12(theta))
+        Some(ReportCoefficients::from_theta12(theta))
     }
 }
 
-impl Dynamics {
+impl RobotDynamics {
     pub fn robot(&self) -> &Robot {
         &self.robot
     }

@@ -23,37 +23,38 @@ use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
 
 use cft::regressor::{regressor12, regressor22};
-use cft::{Setup, Structure};
-use tree::{Coordinate, Coupling, Grouping, Link, Parameters, Tree};
+use cft::{LaboratorySetup, ParameterStructure};
+use tree::{Coordinate, JointCoupling, Link, ParameterGroup, Parameters, Tree};
 
 pub use error::RobotError;
 pub use formula_signal::FormulaSignal;
 pub use joint::{JointKind, ParameterInfo};
-use practice::{Nominal, Practice};
+use practice::{NominalModel, OperatingDefaults};
 pub use transmission::Transmission;
 
 /// A robot whose inverse dynamics are linear in its inertial parameters: links on joints, what a fit can
 /// determine of them, and how the motors move the joints. Cheap to clone.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Robot(Arc<Parts>);
+pub struct Robot(Arc<RobotParts>);
 
+/// What a robot is made of; its copies share it.
 #[derive(Debug, PartialEq)]
-struct Parts {
+struct RobotParts {
     names: Vec<String>,
     tree: Arc<Tree>,
     /// Whether each joint's drive has an inertia of its own.
     drive_inertia: bool,
     transmission: Transmission,
-    form: Form,
+    form: DynamicsForm,
 }
 
 /// How the torques are computed, and with it which parameters they are linear in.
 #[derive(Debug, PartialEq)]
-enum Form {
+enum DynamicsForm {
     /// One joint with a constant inertia, free of gravity: tau = inertia a + F(v).
     Inertia,
     /// The closed forms of the CFT robot's report, with 12 or 22 parameters.
-    Report(Structure),
+    Report(ParameterStructure),
     /// The recursion along the tree, in base parameters.
     Recursion(Parameters),
 }
@@ -80,13 +81,13 @@ static OF_REPORT: LazyLock<Arc<Tree>> =
 
 impl Robot {
     /// The CFT robot with a set-up and a structure of the inertial parameters.
-    pub fn cft(setup: Setup, structure: Structure) -> Self {
-        Self(Arc::new(Parts {
+    pub fn cft(setup: LaboratorySetup, structure: ParameterStructure) -> Self {
+        Self(Arc::new(RobotParts {
             names: cft::JOINTS.map(String::from).to_vec(),
             tree: Arc::clone(&OF_REPORT),
             drive_inertia: false,
             transmission: Transmission::pantograph(setup),
-            form: Form::Report(structure),
+            form: DynamicsForm::Report(structure),
         }))
     }
 
@@ -103,12 +104,12 @@ impl Robot {
             coordinate: Coordinate::Joint(0),
         };
         let tree = Tree::new(vec![link], 1, [0.0; 3]).expect("one link is a tree");
-        Self(Arc::new(Parts {
+        Self(Arc::new(RobotParts {
             names: vec![name.into()],
             tree: Arc::new(tree),
             drive_inertia: false,
             transmission: Transmission::default(),
-            form: Form::Inertia,
+            form: DynamicsForm::Inertia,
         }))
     }
 
@@ -118,10 +119,11 @@ impl Robot {
         tree: Tree,
         names: Vec<String>,
         drive_inertia: bool,
-        couplings: Vec<Coupling>,
+        couplings: Vec<JointCoupling>,
     ) -> Self {
-        let form = Form::Recursion(Parameters::new(&tree, &names, drive_inertia, &couplings));
-        Self(Arc::new(Parts {
+        let form =
+            DynamicsForm::Recursion(Parameters::new(&tree, &names, drive_inertia, &couplings));
+        Self(Arc::new(RobotParts {
             names,
             tree: Arc::new(tree),
             drive_inertia,
@@ -157,7 +159,7 @@ impl Robot {
 
     /// Whether the links have places and centres of gravity in the model. Those of a single joint do not.
     pub fn knows_links(&self) -> bool {
-        !matches!(self.0.form, Form::Inertia)
+        !matches!(self.0.form, DynamicsForm::Inertia)
     }
 
     /// Whether each joint's drive has an inertia of its own.
@@ -186,40 +188,40 @@ impl Robot {
 
     /// Numbers that stand for the robot where no model is given; none for a robot that only its file
     /// describes.
-    pub fn nominal(&self) -> Option<Nominal> {
+    pub fn nominal(&self) -> Option<NominalModel> {
         self.transmission().setup()?;
         let mut theta = cft::practice::INERTIA.to_vec();
         theta.resize(self.parameters().len(), 0.0);
-        Some(Nominal {
+        Some(NominalModel {
             theta,
             friction: friction::DoubleTanh::cft_joints(&cft::practice::FRICTION).to_vec(),
         })
     }
 
     /// How the robot is run, where more is known of that than its file says.
-    pub fn practice(&self) -> Option<Practice> {
+    pub fn practice(&self) -> Option<OperatingDefaults> {
         self.transmission().setup().map(cft::practice::of)
     }
 
     /// The inertial parameters, in the order of the regressor's columns.
     pub fn parameters(&self) -> &[ParameterInfo] {
         match &self.0.form {
-            Form::Inertia => match self.joint_kind(0) {
+            DynamicsForm::Inertia => match self.joint_kind(0) {
                 JointKind::Prismatic => &INERTIA_KG,
                 JointKind::Revolute => &INERTIA_KG_M2,
             },
-            Form::Report(Structure::Printed12) => &cft::EXTENDED[..cft::PRINTED],
-            Form::Report(Structure::Full22) => &cft::EXTENDED,
-            Form::Recursion(parameters) => parameters.infos(),
+            DynamicsForm::Report(ParameterStructure::Printed12) => &cft::EXTENDED[..cft::PRINTED],
+            DynamicsForm::Report(ParameterStructure::Full22) => &cft::EXTENDED,
+            DynamicsForm::Recursion(parameters) => parameters.infos(),
         }
     }
 
     /// How base parameters that were found from the links are grouped, in the order of the first
     /// parameters; empty where the parameters are declared.
-    pub fn groupings(&self) -> &[Grouping] {
+    pub fn groupings(&self) -> &[ParameterGroup] {
         match &self.0.form {
-            Form::Recursion(parameters) => parameters.groupings(),
-            Form::Inertia | Form::Report(_) => &[],
+            DynamicsForm::Recursion(parameters) => parameters.groupings(),
+            DynamicsForm::Inertia | DynamicsForm::Report(_) => &[],
         }
     }
 
@@ -227,8 +229,8 @@ impl Robot {
     /// [`friction::DoubleTanh::NAMES`]) of joint `j`, where it has one: 13 + 4 k + j.
     pub fn friction_theta(&self, j: usize, k: usize) -> Option<u32> {
         match &self.0.form {
-            Form::Report(_) => Some((13 + 4 * k + j) as u32),
-            Form::Inertia | Form::Recursion(_) => None,
+            DynamicsForm::Report(_) => Some((13 + 4 * k + j) as u32),
+            DynamicsForm::Inertia | DynamicsForm::Recursion(_) => None,
         }
     }
 
@@ -240,16 +242,20 @@ impl Robot {
     #[inline]
     pub fn regressor(&self, q: &[f64], v: &[f64], a: &[f64], y: &mut [f64]) {
         match &self.0.form {
-            Form::Inertia => {
+            DynamicsForm::Inertia => {
                 assert!(
                     q.len() == 1 && v.len() == 1 && y.len() == 1,
                     "one joint, one parameter"
                 );
                 y[0] = a[0];
             }
-            Form::Report(Structure::Printed12) => regressor12(four(q), four(v), four(a), rows(y)),
-            Form::Report(Structure::Full22) => regressor22(four(q), four(v), four(a), rows(y)),
-            Form::Recursion(parameters) => parameters.regressor(self.tree(), q, v, a, y),
+            DynamicsForm::Report(ParameterStructure::Printed12) => {
+                regressor12(four(q), four(v), four(a), rows(y))
+            }
+            DynamicsForm::Report(ParameterStructure::Full22) => {
+                regressor22(four(q), four(v), four(a), rows(y))
+            }
+            DynamicsForm::Recursion(parameters) => parameters.regressor(self.tree(), q, v, a, y),
         }
     }
 
@@ -280,8 +286,8 @@ impl Robot {
     #[inline]
     pub fn torque(&self, theta: &[f64], q: &[f64], v: &[f64], a: &[f64], tau: &mut [f64]) {
         match &self.0.form {
-            Form::Inertia => tau[0] = a[0] * theta[0],
-            Form::Report(_) => {
+            DynamicsForm::Inertia => tau[0] = a[0] * theta[0],
+            DynamicsForm::Report(_) => {
                 let (mut buffer, p) = ([0.0; MOST_OF_REPORT], theta.len());
                 let y = &mut buffer[..4 * p];
                 self.regressor(q, v, a, y);
@@ -289,7 +295,7 @@ impl Robot {
                     *tau = row.iter().zip(theta).map(|(y, t)| y * t).sum();
                 }
             }
-            Form::Recursion(parameters) => {
+            DynamicsForm::Recursion(parameters) => {
                 parameters.torque(self.tree(), theta, [q, v, a], tau);
             }
         }

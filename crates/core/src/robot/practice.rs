@@ -4,7 +4,7 @@ use super::friction::DoubleTanh;
 
 /// Numbers that stand for a robot that no model is given for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Nominal {
+pub struct NominalModel {
     /// Inertial parameters, in the order of the regressor's columns.
     pub theta: Vec<f64>,
     pub friction: Vec<DoubleTanh>,
@@ -12,7 +12,7 @@ pub struct Nominal {
 
 /// How a robot is run where nothing says otherwise; motors in the order of their coordinates.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Practice {
+pub struct OperatingDefaults {
     /// Largest voltage of the amplifiers \[V\].
     pub volts: f64,
     /// Top speed of each motor's coordinate \[m/s or rad/s\].

@@ -4,24 +4,24 @@
 //! Vectors of motors and of joints have one number each per joint. Where the motors are at the joints
 //! their coordinates are the joints' own, and one volt stands for one unit of torque.
 
-use super::cft::actuation::{self, ActuationLimits, ENCODER_SCALE, Setup};
+use super::cft::actuation::{self, ActuationLimits, ENCODER_SCALE, LaboratorySetup};
 use super::cft::pantograph::{self, TURN_OFFSET};
 use super::cft::{COORDINATES, geometry};
 use super::error::RobotError;
 use super::joint::JointKind;
-use super::tree::Coupling;
+use super::tree::JointCoupling;
 
 /// How the motors of a robot move its joints.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Transmission {
-    couplings: Vec<Coupling>,
+    couplings: Vec<JointCoupling>,
     /// The pantograph of the CFT robot, eq. (45)-(57), with its amplifiers.
-    pantograph: Option<Setup>,
+    pantograph: Option<LaboratorySetup>,
 }
 
 impl Transmission {
     /// A motor at each joint, some of them turned by other joints too.
-    pub(super) fn geared(couplings: Vec<Coupling>) -> Self {
+    pub(super) fn geared(couplings: Vec<JointCoupling>) -> Self {
         Self {
             couplings,
             pantograph: None,
@@ -29,7 +29,7 @@ impl Transmission {
     }
 
     /// The motors of x_c1..x_c4, through the pantograph and Table 6.
-    pub(super) fn pantograph(setup: Setup) -> Self {
+    pub(super) fn pantograph(setup: LaboratorySetup) -> Self {
         Self {
             couplings: Vec::new(),
             pantograph: Some(setup),
@@ -37,7 +37,7 @@ impl Transmission {
     }
 
     /// Coupled gear trains.
-    pub fn couplings(&self) -> &[Coupling] {
+    pub fn couplings(&self) -> &[JointCoupling] {
         &self.couplings
     }
 
@@ -75,7 +75,7 @@ impl Transmission {
 
     /// Limits of the motors' coordinates (Table 5); `None` where only the robot's file knows them.
     pub fn limits(&self) -> Option<ActuationLimits> {
-        self.pantograph.map(Setup::limits)
+        self.pantograph.map(LaboratorySetup::limits)
     }
 
     /// Full travel of joint i by Table 5 of the CFT robot's report: q1 by x_c4, q2 by x_c3, q4 and q5
@@ -87,11 +87,11 @@ impl Transmission {
 
     /// Motor force or torque per volt (Table 6); `None` where the amplifiers are not known.
     pub fn gains(&self) -> Option<[f64; 4]> {
-        self.pantograph.map(Setup::gains)
+        self.pantograph.map(LaboratorySetup::gains)
     }
 
     /// The set-up of the amplifiers, where they are known.
-    pub fn setup(&self) -> Option<Setup> {
+    pub fn setup(&self) -> Option<LaboratorySetup> {
         self.pantograph
     }
 
@@ -101,7 +101,7 @@ impl Transmission {
         &self,
         x: &[f64],
         out: &mut [f64],
-        found: impl FnOnce(Setup) -> Result<[f64; 4], RobotError>,
+        found: impl FnOnce(LaboratorySetup) -> Result<[f64; 4], RobotError>,
     ) -> Result<(), RobotError> {
         match self.pantograph {
             None => out.copy_from_slice(x),
@@ -246,7 +246,7 @@ mod tests {
     fn a_coordinate_that_is_a_joint_differs_from_it_by_a_constant() {
         let direct = Transmission::default();
         assert_eq!(direct.joint_of(2), Some((2, 0.0)));
-        let drive = Transmission::pantograph(Setup::default());
+        let drive = Transmission::pantograph(LaboratorySetup::default());
         for (i, joint) in (0..4).filter_map(|i| Some((i, drive.joint_of(i)?))) {
             for q in [[0.35, 0.2, 0.9, 0.8], [0.31, -0.4, 1.0, 0.6]] {
                 let x = pantograph::cartesian(&q);
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn steps_of_the_encoders_are_seen_at_the_joints_through_the_pose() {
-        let drive = Transmission::pantograph(Setup::default());
+        let drive = Transmission::pantograph(LaboratorySetup::default());
         let q = [0.35, 0.2, 0.9, 0.8];
         let x = pantograph::cartesian(&q);
         // each coordinate by itself moved to and fro by its step

@@ -3,41 +3,44 @@
 
 use std::sync::LazyLock;
 
-use super::cft::dynamics::Coefficients;
+use super::cft::dynamics::ReportCoefficients;
 use super::cft::links::{PseudoInertia, base_parameters};
 use super::cft::regressor::regressor22;
-use super::cft::{PRINTED, Structure, UNPRINTED};
+use super::cft::{PRINTED, ParameterStructure, UNPRINTED};
 use super::standard::{Body, STANDARD};
 use super::tree::newton_euler::{torques, walk};
 use super::tree::{MOST_JOINTS, Tree};
-use super::{Form, Robot, four};
+use super::{DynamicsForm, Robot, four};
 
 /// Torques of a gravity of one along the x and the y of the base. Masses m_i at p_i have the potential
 /// -sum m_i (gx p_x + gy p_y); the first moments of the CFT robot's chain are those of its kinetic energy
 /// (eq. (60)), those of other links are their base parameters. First moments that are no parameter, as those
 /// about a vertical first axis, count as none.
 #[derive(Debug, Clone)]
-pub struct Tilt(Moments);
+pub struct BaseTilt(GravityMoments);
 
+/// What the moments of a tilted base are computed from; `Unknown` where nothing is known of the links.
 #[derive(Debug, Clone)]
-enum Moments {
+enum GravityMoments {
     Unknown,
-    Report(Box<Coefficients>),
+    Report(Box<ReportCoefficients>),
     /// The tree in each of the two gravities, and standard parameters of its links.
     Links(Box<[Tree; 2]>, Vec<[f64; STANDARD]>),
 }
 
 impl Robot {
     /// What a base that stands askew adds, for inertial parameters `theta`.
-    pub fn tilt(&self, theta: &[f64]) -> Tilt {
-        Tilt(match &self.0.form {
-            Form::Inertia => Moments::Unknown,
-            Form::Report(_) => (self.coefficients(theta))
-                .map_or(Moments::Unknown, |closed| Moments::Report(Box::new(closed))),
-            Form::Recursion(_) => {
+    pub fn tilt(&self, theta: &[f64]) -> BaseTilt {
+        BaseTilt(match &self.0.form {
+            DynamicsForm::Inertia => GravityMoments::Unknown,
+            DynamicsForm::Report(_) => (self.coefficients(theta))
+                .map_or(GravityMoments::Unknown, |closed| {
+                    GravityMoments::Report(Box::new(closed))
+                }),
+            DynamicsForm::Recursion(_) => {
                 let along = |gravity| self.tree().in_gravity(gravity);
                 let trees = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(along);
-                Moments::Links(Box::new(trees), self.link_parameters(theta))
+                GravityMoments::Links(Box::new(trees), self.link_parameters(theta))
             }
         })
     }
@@ -50,7 +53,7 @@ impl Robot {
     /// Whether the last link turns about the vertical alone, as the tool of the CFT robot and what a single
     /// joint carries do: a body on it then has one moment of inertia that shows.
     pub fn tool_stays_level(&self) -> bool {
-        !matches!(self.0.form, Form::Recursion(_))
+        !matches!(self.0.form, DynamicsForm::Recursion(_))
     }
 
     /// Torque of joint `joint` by mass, first moments and moment of inertia about the vertical of a body on a
@@ -58,13 +61,13 @@ impl Robot {
     /// body adds to it is in the first number.
     pub fn level_tool_row(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64]) -> [f64; 5] {
         match &self.0.form {
-            Form::Inertia => [a[joint], 0.0, 0.0, 0.0, 0.0],
-            Form::Report(_) => {
+            DynamicsForm::Inertia => [a[joint], 0.0, 0.0, 0.0, 0.0],
+            DynamicsForm::Report(_) => {
                 let mut y = [[0.0; 22]; 4];
                 regressor22(four(q), four(v), four(a), &mut y);
                 BODIES.map(|body| y[joint].iter().zip(&body).map(|(y, b)| y * b).sum())
             }
-            Form::Recursion(_) => {
+            DynamicsForm::Recursion(_) => {
                 let row = self.tool_row(joint, q, v, a);
                 [row[9], row[6], row[7], row[8], row[0] + row[3] + row[5]]
             }
@@ -102,8 +105,8 @@ impl Robot {
     /// Likewise for the five numbers of [`Self::level_tool_row`].
     pub(crate) fn level_tool_links(&self, numbers: [f64; 5]) -> Vec<[f64; STANDARD]> {
         match &self.0.form {
-            Form::Inertia => self.link_parameters(&numbers[..1]),
-            Form::Report(_) => {
+            DynamicsForm::Inertia => self.link_parameters(&numbers[..1]),
+            DynamicsForm::Report(_) => {
                 let mut theta = [0.0; 22];
                 for (body, x) in BODIES.iter().zip(numbers) {
                     for (sum, y) in theta.iter_mut().zip(body) {
@@ -112,7 +115,7 @@ impl Robot {
                 }
                 self.link_parameters(&theta)
             }
-            Form::Recursion(_) => {
+            DynamicsForm::Recursion(_) => {
                 let [mass, mx, my, mz, second] = numbers;
                 let mut links = vec![[0.0; STANDARD]; self.tree().links().len()];
                 links[self.tool_link()] = [second, 0.0, 0.0, second, 0.0, second, mx, my, mz, mass];
@@ -133,7 +136,7 @@ impl Robot {
     /// Names of the base parameters of the full chain that the declared structure drops.
     pub fn dropped_parameters(&self) -> &'static [&'static str] {
         match self.0.form {
-            Form::Report(Structure::Printed12) => &UNPRINTED,
+            DynamicsForm::Report(ParameterStructure::Printed12) => &UNPRINTED,
             _ => &[],
         }
     }
@@ -148,18 +151,18 @@ impl Robot {
     }
 }
 
-impl Tilt {
+impl BaseTilt {
     /// Torques at the pose q, those of each joint by the two gravities \[N or N m per m/s^2\].
     pub fn torques(&self, q: &[f64], out: &mut [[f64; 2]]) {
         out.fill([0.0; 2]);
         match &self.0 {
-            Moments::Unknown => {}
-            Moments::Report(chain) => {
+            GravityMoments::Unknown => {}
+            GravityMoments::Report(chain) => {
                 for (joint, out) in out.iter_mut().enumerate() {
                     *out = of_report(chain, joint, four(q));
                 }
             }
-            Moments::Links(trees, bodies) => {
+            GravityMoments::Links(trees, bodies) => {
                 let still = [0.0; MOST_JOINTS];
                 for (direction, tree) in trees.iter().enumerate() {
                     let mut of_joints = [0.0; MOST_JOINTS];
@@ -174,7 +177,7 @@ impl Tilt {
     }
 }
 
-fn of_report(chain: &Coefficients, joint: usize, q: &[f64; 4]) -> [f64; 2] {
+fn of_report(chain: &ReportCoefficients, joint: usize, q: &[f64; 4]) -> [f64; 2] {
     let [a, b, cc, e] = chain.h;
     let (s2, c2) = q[1].sin_cos();
     let (s4, c4) = q[2].sin_cos();

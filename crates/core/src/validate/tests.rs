@@ -2,12 +2,12 @@
 
 use super::*;
 use crate::robot::Robot;
-use crate::robot::cft::{Setup, Structure};
+use crate::robot::cft::{LaboratorySetup, ParameterStructure};
 
 const STEP: f64 = 1e-3;
 
 fn model() -> Model {
-    let robot = Robot::cft(Setup::default(), Structure::Printed12);
+    let robot = Robot::cft(LaboratorySetup::default(), ParameterStructure::Printed12);
     Model {
         theta: vec![0.0; robot.parameters().len()],
         friction: vec![JointFriction::None; 4],
@@ -41,14 +41,14 @@ fn each_joint_has_its_own_band_and_error_and_rows_are_counted_once_decimated() {
     let band = |_: [&[f64]; 3], _: &[f64], out: &mut [f64]| {
         out.copy_from_slice(&[0.5, 2.5, 2.5, 4.5]);
     };
-    let mut all = Reconstruction::new(&model, &[-1.0; 4], Some(&band));
+    let mut all = TorqueReconstruction::new(&model, &[-1.0; 4], Some(&band));
     let mut given = Some(log());
     let mut next = |block: &mut Block| -> Result<bool, std::convert::Infallible> {
         *block = given.take().unwrap_or_default();
         Ok(false)
     };
     let mut widths = Vec::new();
-    let mut row = |r: &Reconstructed| widths = r.half_width.to_vec();
+    let mut row = |r: &ReconstructedRow| widths = r.half_width.to_vec();
     let summary = all.add(&settings, &mut next, &mut row).unwrap();
     assert_eq!(summary.decimation, 10);
     assert_eq!(widths, [0.5, 2.5, 2.5, 4.5]);

@@ -2,15 +2,15 @@
 
 use cft_ident_core::math::gram::{gram, stride};
 use cft_ident_core::math::rfactor::RFactor;
-use cft_ident_core::math::sos::Sos;
+use cft_ident_core::math::sos::SosFilter;
 use cft_ident_core::math::zero_phase::ZeroPhase;
 use nalgebra::DMatrix;
 
 const RATE: f64 = 1000.0;
 
 fn filters() -> [ZeroPhase; 3] {
-    let butterworth = |order, cutoff| Sos::butterworth(order, cutoff, RATE).expect("valid");
-    let chebyshev = Sos::chebyshev(8, 0.05, 40.0, RATE).expect("valid");
+    let butterworth = |order, cutoff| SosFilter::butterworth(order, cutoff, RATE).expect("valid");
+    let chebyshev = SosFilter::chebyshev(8, 0.05, 40.0, RATE).expect("valid");
     [butterworth(4, 20.0), butterworth(5, 80.0), chebyshev].map(ZeroPhase::new)
 }
 

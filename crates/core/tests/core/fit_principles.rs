@@ -1,8 +1,8 @@
 //! What least squares must satisfy whatever the rows are: invariances, and what two sets of rows are together.
 
-use cft_ident_core::inertia::accumulate::{Accumulator, BlockFactors};
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
-use cft_ident_core::inertia::solve::{Fit, Weighting, fit, residual_of};
+use cft_ident_core::inertia::accumulate::{BlockFactors, RowAccumulator};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
+use cft_ident_core::inertia::solve::{Fit, RowWeighting, fit, residual_of};
 use cft_ident_core::robot::{JointKind, Robot};
 use nalgebra::DVector;
 
@@ -18,7 +18,11 @@ fn columns() -> RegressorColumns {
     RegressorColumns {
         joints: 1,
         shared: 1,
-        own: vec![vec![Own::Viscous, Own::Coulomb, Own::Offset]],
+        own: vec![vec![
+            JointTerm::Viscous,
+            JointTerm::Coulomb,
+            JointTerm::Offset,
+        ]],
         known: vec![None],
         rest_speed: Vec::new(),
     }
@@ -57,7 +61,7 @@ fn rows(noise: f64, seed: u32) -> Vec<Row> {
 fn sums(rows: &[Row]) -> BlockFactors {
     let columns = columns();
     let robot = Robot::single_joint("q1", JointKind::Prismatic);
-    let mut all = Accumulator::new(columns.clone(), 0.05);
+    let mut all = RowAccumulator::new(columns.clone(), 0.05);
     let mut channels = vec![0.0; columns.channels()];
     for [v, a, tau] in rows {
         columns.fill(&robot, &[0.0], &[*v], &[*a], &[*tau], &mut channels);
@@ -66,7 +70,7 @@ fn sums(rows: &[Row]) -> BlockFactors {
     all.finish()
 }
 
-fn fitted(rows: &[Row], weighting: Weighting) -> Fit {
+fn fitted(rows: &[Row], weighting: RowWeighting) -> Fit {
     fit(&sums(rows), weighting).expect("rows that determine all")
 }
 
@@ -78,7 +82,7 @@ fn near(found: &DVector<f64>, expected: &DVector<f64>, relative: f64) {
 
 #[test]
 fn torques_without_noise_give_back_what_made_them() {
-    for weighting in [Weighting::Ols, Weighting::Wls] {
+    for weighting in [RowWeighting::Ols, RowWeighting::Wls] {
         let found = fitted(&rows(0.0, 1), weighting);
         near(&found.theta, &DVector::from_row_slice(&TRUE), 1e-10);
         assert!(found.relative_error[0].all < 1e-9);
@@ -94,7 +98,7 @@ fn torques_in_another_unit_scale_parameters_and_deviations_alike() {
         .iter()
         .map(|[v, a, tau]| [*v, *a, 1000.0 * tau])
         .collect();
-    let [a, b] = [&plain, &scaled].map(|rows| fitted(rows, Weighting::Wls));
+    let [a, b] = [&plain, &scaled].map(|rows| fitted(rows, RowWeighting::Wls));
     near(&b.theta, &(1000.0 * &a.theta), 1e-9);
     let [a_std, b_std] = [&a, &b].map(|f| f.covariance.diagonal().map(f64::sqrt));
     near(&b_std, &(1000.0 * &a_std), 1e-7);
@@ -110,7 +114,7 @@ fn torques_of_more_parameters_move_the_fit_by_those_and_change_no_residual() {
     let moved: Vec<Row> = (plain.iter())
         .map(|row| [row[0], row[1], row[2] + torque(row, &more)])
         .collect();
-    let [a, b] = [&plain, &moved].map(|rows| fitted(rows, Weighting::Wls));
+    let [a, b] = [&plain, &moved].map(|rows| fitted(rows, RowWeighting::Wls));
     near(&(b.theta - &a.theta), &DVector::from_row_slice(&more), 1e-9);
     assert!((b.residual_std[0] / a.residual_std[0] - 1.0).abs() < 1e-9);
     near(&b.covariance.diagonal(), &a.covariance.diagonal(), 1e-6);
@@ -119,7 +123,7 @@ fn torques_of_more_parameters_move_the_fit_by_those_and_change_no_residual() {
 #[test]
 fn what_is_left_is_at_right_angles_to_every_column() {
     let rows = rows(0.5, 4);
-    let found = fitted(&rows, Weighting::Ols);
+    let found = fitted(&rows, RowWeighting::Ols);
     let theta: [f64; 4] = std::array::from_fn(|i| found.theta[i]);
     let (mut along, mut size) = ([0.0; 4], [0.0; 4]);
     let mut square = 0.0;
@@ -153,7 +157,7 @@ fn time_that_runs_backwards_gives_the_same_parameters() {
             [turned[0], turned[1], torque(&turned, &TRUE) + left]
         })
         .collect();
-    let [a, b] = [&plain, &back].map(|rows| fitted(rows, Weighting::Wls).theta);
+    let [a, b] = [&plain, &back].map(|rows| fitted(rows, RowWeighting::Wls).theta);
     // even columns keep their estimate, odd ones their error with the other sign
     for i in [0, 3] {
         assert!((a[i] - b[i]).abs() < 1e-9, "{i}");
@@ -169,12 +173,12 @@ fn logs_together_are_their_rows_in_any_order() {
     let together = |first: &[Row], second: &[Row]| {
         let mut all = sums(first);
         all.merge(sums(second));
-        fit(&all, Weighting::Ols).expect("rows that determine all")
+        fit(&all, RowWeighting::Ols).expect("rows that determine all")
     };
     let [a, b] = [together(&one, &other), together(&other, &one)];
     near(&a.theta, &b.theta, 1e-12);
     near(&a.covariance.diagonal(), &b.covariance.diagonal(), 1e-6);
-    let whole = fitted(&[one, other].concat(), Weighting::Ols);
+    let whole = fitted(&[one, other].concat(), RowWeighting::Ols);
     near(&a.theta, &whole.theta, 1e-10);
     assert_eq!(a.rows, whole.rows);
 }
@@ -182,10 +186,10 @@ fn logs_together_are_their_rows_in_any_order() {
 #[test]
 fn twice_the_rows_halve_the_variance_and_their_own_copy_moves_nothing() {
     let one = rows(0.5, 8);
-    let alone = fitted(&one, Weighting::Ols);
+    let alone = fitted(&one, RowWeighting::Ols);
     let mut twice = sums(&one);
     twice.merge(sums(&one));
-    let twice = fit(&twice, Weighting::Ols).expect("rows that determine all");
+    let twice = fit(&twice, RowWeighting::Ols).expect("rows that determine all");
     near(&twice.theta, &alone.theta, 1e-10);
     for i in 0..4 {
         let ratio = twice.covariance[(i, i)] / alone.covariance[(i, i)];
@@ -198,7 +202,7 @@ fn deviations_are_those_of_fits_to_other_noise() {
     let (mut squares, mut promised) = ([0.0; 4], [0.0; 4]);
     let runs = 200;
     for seed in 0..runs {
-        let found = fitted(&rows(0.5, 100 + seed), Weighting::Ols);
+        let found = fitted(&rows(0.5, 100 + seed), RowWeighting::Ols);
         for i in 0..4 {
             squares[i] += (found.theta[i] - TRUE[i]).powi(2);
             promised[i] += found.covariance[(i, i)];

@@ -7,7 +7,7 @@ use cft_ident_core::block::Block;
 use cft_ident_core::math::rank;
 use cft_ident_core::math::rfactor::RFactor;
 use cft_ident_core::motion::{
-    self, Differences, FilterSettings, FilteredRow, MotionSample, ParallelFilter, Summary,
+    self, DifferenceFormula, FilterSettings, FilteredRow, MotionSample, ParallelFilter, Summary,
 };
 
 /// The named columns of a file, row by row; none where the data folder is absent.
@@ -62,7 +62,7 @@ fn settings(trim_s: f64) -> FilterSettings {
         decimation: Some(10),
         q_cutoff_hz: Some(100.0),
         q_order: 4,
-        differences: Differences::Central,
+        differences: DifferenceFormula::Central,
         q_trim_s: Some(0.0),
         trim_s: Some(trim_s),
         ..FilterSettings::default()

@@ -3,10 +3,10 @@
 use std::convert::Infallible;
 
 use cft_ident_core::block::Block;
-use cft_ident_core::math::sos::Sos;
+use cft_ident_core::math::sos::SosFilter;
 use cft_ident_core::math::zero_phase::ZeroPhase;
 use cft_ident_core::motion::{
-    self, Differences, FilterSettings, FilteredRow, MotionSample, ParallelFilter, Summary,
+    self, DifferenceFormula, FilterSettings, FilteredRow, MotionSample, ParallelFilter, Summary,
     TorqueTiming,
 };
 use proptest::prelude::*;
@@ -109,11 +109,13 @@ fn whole(log: &Log, stretches: &[usize], settings: &FilterSettings, dt: f64) -> 
     let rate = 1.0 / dt;
     let q_cutoff = settings.q_cutoff_hz.expect("given");
     let position =
-        ZeroPhase::new(Sos::butterworth(settings.q_order, q_cutoff, rate).expect("valid"));
+        ZeroPhase::new(SosFilter::butterworth(settings.q_order, q_cutoff, rate).expect("valid"));
     let sos = match settings.filter {
-        ParallelFilter::Butterworth { order } => Sos::butterworth(order, settings.cutoff_hz, rate),
+        ParallelFilter::Butterworth { order } => {
+            SosFilter::butterworth(order, settings.cutoff_hz, rate)
+        }
         ParallelFilter::Chebyshev { order, ripple_db } => {
-            Sos::chebyshev(order, ripple_db, settings.cutoff_hz, rate)
+            SosFilter::chebyshev(order, ripple_db, settings.cutoff_hz, rate)
         }
     };
     let parallel = ZeroPhase::new(sos.expect("valid"));
@@ -246,7 +248,7 @@ fn a_long_log_in_windows_equals_the_whole_log() {
             ripple_db: 0.05,
         },
     ] {
-        for differences in [Differences::Central, Differences::HighOrder] {
+        for differences in [DifferenceFormula::Central, DifferenceFormula::HighOrder] {
             for (q_trim, trim) in [(0.0, 0.0), (0.06, 0.1), (0.5, 2.0)] {
                 let settings = FilterSettings {
                     filter,
@@ -342,7 +344,7 @@ fn a_log_much_faster_than_its_motion_gives_the_same_rows_from_fewer_samples() {
     let full = FilterSettings {
         cutoff_hz: 20.0,
         q_cutoff_hz: Some(100.0),
-        differences: Differences::HighOrder,
+        differences: DifferenceFormula::HighOrder,
         decimation: Some(25),
         ..FilterSettings::default()
     };

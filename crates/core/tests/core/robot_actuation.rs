@@ -2,7 +2,9 @@
 
 use crate::robot_oracle;
 
-use cft_ident_core::robot::cft::{Coefficients, Setup, actuation, dynamics, pantograph};
+use cft_ident_core::robot::cft::{
+    LaboratorySetup, ReportCoefficients, actuation, dynamics, pantograph,
+};
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::standard::{Body, pseudo_inertia};
 use robot_oracle::{Draw, Oracle, assert_close, assert_close_rows};
@@ -11,7 +13,7 @@ use robot_oracle::{Draw, Oracle, assert_close, assert_close_rows};
 fn one_kilogram_at_the_wrist_needs_7_g_on_x_c1_and_nothing_on_x_c2_in_any_pose() {
     let mut theta = [0.0; 12];
     theta[11] = 1.0;
-    let k = Coefficients::from_theta12(&theta);
+    let k = ReportCoefficients::from_theta12(&theta);
     let mut draw = Draw::new(33);
     for _ in 0..200 {
         let (q, _, _) = draw.state();
@@ -31,7 +33,7 @@ fn the_synthetic_arm_at_rest_needs_the_volts_of_the_model_page() {
     let oracle = Oracle::load();
     // Mid-workspace: the offsets of the report's trajectory.
     let q = pantograph::joints(&[-0.1343, 0.2766, 2.4, 0.0869]).unwrap();
-    let g = dynamics::gravity_torque(&q, &Coefficients::from_theta12(&oracle.theta));
+    let g = dynamics::gravity_torque(&q, &ReportCoefficients::from_theta12(&oracle.theta));
     assert!(
         (g[2] + 3.67).abs() < 0.01 && (g[3] + 13.71).abs() < 0.01,
         "G = {g:?}"
@@ -41,7 +43,7 @@ fn the_synthetic_arm_at_rest_needs_the_volts_of_the_model_page() {
         (force[0] + 284.2).abs() < 0.1 && (force[1] - 66.8).abs() < 0.1,
         "F = {force:?}"
     );
-    let volts = Setup::Tuedacs.torques_to_volts(&q, &g).unwrap();
+    let volts = LaboratorySetup::Tuedacs.torques_to_volts(&q, &g).unwrap();
     assert!(
         (volts[0] + 0.66).abs() < 0.005 && (volts[1] - 0.16).abs() < 0.005,
         "{volts:?}"
@@ -51,7 +53,7 @@ fn the_synthetic_arm_at_rest_needs_the_volts_of_the_model_page() {
 #[test]
 fn forces_and_volts_return_over_the_workspace_of_both_setups() {
     let mut draw = Draw::new(34);
-    for setup in [Setup::Tuedacs, Setup::Dspace] {
+    for setup in [LaboratorySetup::Tuedacs, LaboratorySetup::Dspace] {
         for _ in 0..500 {
             let x = draw.position(&setup.limits());
             let q = pantograph::joints(&x).unwrap();
@@ -82,7 +84,10 @@ fn forces_and_volts_return_over_the_workspace_of_both_setups() {
 #[test]
 fn gains_follow_from_amplifier_motor_and_gears_of_table_6() {
     // K_T = K_a K_t / (K_g K_c).
-    for (setup, amplifier) in [(Setup::Tuedacs, 1.6), (Setup::Dspace, 0.4)] {
+    for (setup, amplifier) in [
+        (LaboratorySetup::Tuedacs, 1.6),
+        (LaboratorySetup::Dspace, 0.4),
+    ] {
         let motor = amplifier * 0.107;
         let tau = std::f64::consts::TAU;
         let screw = motor / (0.5 * 0.005 / tau);
@@ -96,18 +101,18 @@ fn gains_follow_from_amplifier_motor_and_gears_of_table_6() {
 
 #[test]
 fn limits_find_the_coordinate_that_is_outside() {
-    let limits = Setup::Dspace.limits();
+    let limits = LaboratorySetup::Dspace.limits();
     assert_eq!(limits.first_outside(&limits.middles()), None);
     assert_eq!(limits.first_outside(&[-0.1, 0.2, 2.0, 0.06]), Some(3));
     assert_eq!(
-        Setup::Tuedacs
+        LaboratorySetup::Tuedacs
             .limits()
             .first_outside(&[-0.1, 0.2, 2.0, 0.06]),
         None
     );
     assert_eq!(limits.first_outside(&[f64::NAN, 0.2, 2.0, 0.0]), Some(0));
     // The middles that the report's text gives for x_c3 and x_c4 are not the middles of Table 5.
-    let middles = Setup::Tuedacs.limits().middles();
+    let middles = LaboratorySetup::Tuedacs.limits().middles();
     assert_close(
         &middles,
         &[-0.1343, 0.2766, 2.7908, 0.2369],

@@ -1,6 +1,6 @@
 //! Condition of the regressor along the report's excitation trajectory (eq. (43), Table 3).
 
-use cft_ident_core::robot::cft::{Setup, pantograph, regressor};
+use cft_ident_core::robot::cft::{LaboratorySetup, pantograph, regressor};
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
@@ -90,14 +90,14 @@ fn table_3_uses_28_21_26_and_9_percent_of_the_spans_and_leaves_dspace() {
     let (mut low, mut high) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
     for n in 0..4000 {
         let [x, ..] = trajectory(TAU / w * f64::from(n) / 4000.0, w);
-        assert_eq!(Setup::Tuedacs.limits().first_outside(&x), None);
-        assert_eq!(Setup::Dspace.limits().first_outside(&x), Some(3));
+        assert_eq!(LaboratorySetup::Tuedacs.limits().first_outside(&x), None);
+        assert_eq!(LaboratorySetup::Dspace.limits().first_outside(&x), Some(3));
         for i in 0..4 {
             low[i] = low[i].min(x[i]);
             high[i] = high[i].max(x[i]);
         }
     }
-    let spans = Setup::Tuedacs.limits().spans();
+    let spans = LaboratorySetup::Tuedacs.limits().spans();
     for (i, want) in [28.0, 21.0, 26.0, 9.0].into_iter().enumerate() {
         let used = 100.0 * (high[i] - low[i]) / spans[i];
         assert!((used - want).abs() < 0.6, "x_c{}: {used} %", i + 1);
@@ -106,7 +106,7 @@ fn table_3_uses_28_21_26_and_9_percent_of_the_spans_and_leaves_dspace() {
 
 #[test]
 fn read_as_0_4_rad_per_second_table_3_leaves_every_limit() {
-    let limits = Setup::Tuedacs.limits();
+    let limits = LaboratorySetup::Tuedacs.limits();
     let mut left = [false; 4];
     for n in 0..2000 {
         let [x, ..] = trajectory(TAU / 0.4 * f64::from(n) / 2000.0, 0.4);

@@ -3,7 +3,7 @@
 use crate::robot_oracle;
 
 use cft_ident_core::robot::RobotError;
-use cft_ident_core::robot::cft::{Setup, linkage, pantograph};
+use cft_ident_core::robot::cft::{LaboratorySetup, linkage, pantograph};
 use cft_ident_core::robot::tree::pose;
 use num_dual::{Dual2_64, DualNum};
 use robot_oracle::{Draw, assert_close};
@@ -11,7 +11,7 @@ use robot_oracle::{Draw, assert_close};
 /// A grid over the box of both set-ups' limits, corners and edges included.
 fn box_of_table_5() -> Vec<[f64; 4]> {
     let mut points = Vec::new();
-    for setup in [Setup::Tuedacs, Setup::Dspace] {
+    for setup in [LaboratorySetup::Tuedacs, LaboratorySetup::Dspace] {
         let limits = setup.limits();
         let (fine, coarse) = (32, 4);
         let at = |i: usize, n: usize, of: usize| {

@@ -5,7 +5,7 @@
 use crate::robot_oracle;
 
 use cft_ident_core::robot::cft::links::{PseudoInertia, base_parameters};
-use cft_ident_core::robot::cft::{Coefficients, dynamics, linkage, regressor};
+use cft_ident_core::robot::cft::{ReportCoefficients, dynamics, linkage, regressor};
 use cft_ident_core::robot::tree::pose;
 use num_dual::{Dual, DualNum, HyperDual64, HyperHyperDual64};
 use robot_oracle::{Draw, Oracle, apply, assert_close, assert_close_rows};
@@ -184,7 +184,7 @@ fn the_regressor_of_22_equals_lagrange_on_random_robots() {
             regressor::regressor22(&q, &v, &a, &mut y);
             let want = lagrange(&links, &q, &v, &a);
             assert_close(&apply(&y, &theta), &want, 1e-11, "Y theta");
-            let k = Coefficients::from_theta22(&theta);
+            let k = ReportCoefficients::from_theta22(&theta);
             assert_close(
                 &dynamics::inverse_dynamics(&q, &v, &a, &k),
                 &want,
@@ -244,7 +244,7 @@ fn inertia_and_christoffel_matrix_equal_the_derivatives_of_the_kinetic_energy() 
     let mut draw = Draw::new(4);
     for _ in 0..5 {
         let links = random_links(&mut draw);
-        let k = Coefficients::from_theta22(&base_parameters(&links.map(PseudoInertia)));
+        let k = ReportCoefficients::from_theta22(&base_parameters(&links.map(PseudoInertia)));
         let (q, v, _) = draw.state();
         let (m, dm) = inertia_and_derivatives(&links, &q);
         assert_close_rows(&dynamics::inertia(&q, &k), &m, 1e-11, "M");

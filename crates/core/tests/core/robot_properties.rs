@@ -2,7 +2,9 @@
 
 use crate::robot_oracle;
 
-use cft_ident_core::robot::cft::{Coefficients, Setup, Structure, dynamics, pantograph, regressor};
+use cft_ident_core::robot::cft::{
+    LaboratorySetup, ParameterStructure, ReportCoefficients, dynamics, pantograph, regressor,
+};
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_core::robot::{JointKind, Robot};
 use nalgebra::{DMatrix, Matrix4};
@@ -21,7 +23,7 @@ fn full_theta(oracle: &Oracle) -> [f64; 22] {
 }
 
 /// dM/dt along v by a central difference of fourth order.
-fn inertia_rate(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> [[f64; 4]; 4] {
+fn inertia_rate(q: &[f64; 4], v: &[f64; 4], k: &ReportCoefficients) -> [[f64; 4]; 4] {
     let h = 1e-3;
     let at = |s: f64| dynamics::inertia(&std::array::from_fn(|i| q[i] + s * h * v[i]), k);
     let (m2, m1, p1, p2) = (at(-2.0), at(-1.0), at(1.0), at(2.0));
@@ -37,8 +39,8 @@ fn the_rate_of_inertia_less_twice_coriolis_is_skew() {
     let oracle = Oracle::load();
     let mut draw = Draw::new(11);
     for k in [
-        Coefficients::from_theta12(&oracle.theta),
-        Coefficients::from_theta22(&full_theta(&oracle)),
+        ReportCoefficients::from_theta12(&oracle.theta),
+        ReportCoefficients::from_theta22(&full_theta(&oracle)),
     ] {
         for _ in 0..200 {
             let (q, v, _) = draw.state();
@@ -62,7 +64,7 @@ fn the_rate_of_inertia_less_twice_coriolis_is_skew() {
 #[test]
 fn the_coriolis_matrix_is_linear_in_velocity_and_swaps_its_velocities() {
     let oracle = Oracle::load();
-    let k = Coefficients::from_theta22(&full_theta(&oracle));
+    let k = ReportCoefficients::from_theta22(&full_theta(&oracle));
     let mut draw = Draw::new(12);
     for _ in 0..200 {
         let (q, x, _) = draw.state();
@@ -82,8 +84,8 @@ fn the_coriolis_matrix_is_linear_in_velocity_and_swaps_its_velocities() {
 #[test]
 fn inertia_is_symmetric_positive_definite_over_the_workspace() {
     let oracle = Oracle::load();
-    let k = Coefficients::from_theta12(&oracle.theta);
-    let limits = Setup::Tuedacs.limits();
+    let k = ReportCoefficients::from_theta12(&oracle.theta);
+    let limits = LaboratorySetup::Tuedacs.limits();
     let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
     let steps = 24;
     let at = |i: usize, n: usize| {
@@ -130,7 +132,7 @@ fn torque_is_linear_in_theta_and_equals_the_regressor() {
         let other: [f64; 22] = draw.vector(-2.0, 2.0);
         let mixed: [f64; 22] = std::array::from_fn(|i| 0.7 * theta[i] - 1.3 * other[i]);
         let tau = |theta: &[f64; 22]| {
-            dynamics::inverse_dynamics(&q, &v, &a, &Coefficients::from_theta22(theta))
+            dynamics::inverse_dynamics(&q, &v, &a, &ReportCoefficients::from_theta22(theta))
         };
         let (first, second) = (tau(&theta), tau(&other));
         let sum = std::array::from_fn(|i| 0.7 * first[i] - 1.3 * second[i]);
@@ -144,7 +146,7 @@ fn torque_is_linear_in_theta_and_equals_the_regressor() {
 #[test]
 fn accelerations_of_torques_are_those_that_need_them() {
     let oracle = Oracle::load();
-    let robot = Robot::cft(Setup::default(), Structure::default());
+    let robot = Robot::cft(LaboratorySetup::default(), ParameterStructure::default());
     let accelerations = |theta: &[f64; 12], q: &[f64; 4], v: &[f64; 4], tau: [f64; 4]| {
         let dynamics = robot.dynamics(theta);
         let (mut mass, mut bias) = ([0.0; 16], [0.0; 4]);
@@ -152,7 +154,7 @@ fn accelerations_of_torques_are_those_that_need_them() {
         let mut a = std::array::from_fn(|i| tau[i] - bias[i]);
         dynamics.solve(&mut mass, &mut a).then_some(a)
     };
-    let k = Coefficients::from_theta12(&oracle.theta);
+    let k = ReportCoefficients::from_theta12(&oracle.theta);
     let mut draw = Draw::new(16);
     for _ in 0..200 {
         let (q, v, a) = draw.state();
@@ -196,16 +198,16 @@ fn rank_of_random_states(robot: &Robot, q1_accelerates: bool) -> usize {
 
 #[test]
 fn the_columns_are_independent_and_theta_1_needs_acceleration_of_q1() {
-    let printed = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+    let printed = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
     assert_eq!(rank_of_random_states(&printed, true), 12);
     assert_eq!(rank_of_random_states(&printed, false), 11);
-    let full = Robot::cft(Setup::Tuedacs, Structure::Full22);
+    let full = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Full22);
     assert_eq!(rank_of_random_states(&full, true), 22);
 }
 
 #[test]
 fn the_robot_names_joints_units_and_parameters() {
-    let robot = Robot::cft(Setup::Dspace, Structure::Printed12);
+    let robot = Robot::cft(LaboratorySetup::Dspace, ParameterStructure::Printed12);
     assert_eq!(robot.joint_names(), ["q1", "q2", "q4", "q5"]);
     let units: Vec<_> = (0..robot.joints()).map(|i| robot.joint_unit(i)).collect();
     assert_eq!(units, ["N", "Nm", "Nm", "Nm"]);
@@ -214,7 +216,7 @@ fn the_robot_names_joints_units_and_parameters() {
         assert_eq!(parameter.theta, Some(i as u32 + 1));
         assert!(!parameter.meaning.is_empty());
     }
-    let full = Robot::cft(Setup::Dspace, Structure::Full22);
+    let full = Robot::cft(LaboratorySetup::Dspace, ParameterStructure::Full22);
     let extra: Vec<_> = full.parameters()[12..].iter().map(|p| &*p.name).collect();
     assert_eq!(extra, cft_ident_core::robot::cft::UNPRINTED);
     assert_eq!(
@@ -235,7 +237,7 @@ fn the_robot_names_joints_units_and_parameters() {
 
 #[test]
 fn friction_parameters_carry_their_theta_numbers() {
-    let robot = Robot::cft(Setup::default(), Structure::default());
+    let robot = Robot::cft(LaboratorySetup::default(), ParameterStructure::default());
     // theta_17 is Bf1 of q1, theta_26 is w1 of q2
     let numbers = [(0, 0), (0, 1), (1, 3), (3, 4)].map(|(j, k)| robot.friction_theta(j, k));
     assert_eq!(numbers, [13, 17, 26, 32].map(Some));

@@ -4,7 +4,7 @@ use crate::robot_oracle;
 
 use cft_ident_core::robot::cft::links::{PseudoInertia, base_parameters};
 use cft_ident_core::robot::cft::{
-    Coefficients, Setup, actuation, dynamics, linkage, pantograph, regressor,
+    LaboratorySetup, ReportCoefficients, actuation, dynamics, linkage, pantograph, regressor,
 };
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_core::robot::tree::{pose, space};
@@ -15,7 +15,7 @@ const TOLERANCE: f64 = 1e-10;
 #[test]
 fn inertia_coriolis_and_gravity_equal_the_reference() {
     let oracle = Oracle::load();
-    let k = Coefficients::from_theta12(&oracle.theta);
+    let k = ReportCoefficients::from_theta12(&oracle.theta);
     for state in &oracle.states {
         let (q, v) = (&state.q, &state.v);
         assert_close_rows(&dynamics::inertia(q, &k), &state.m, TOLERANCE, "M");
@@ -38,17 +38,19 @@ fn the_regressor_equals_the_reference() {
 fn friction_torque_and_volts_equal_the_reference() {
     let oracle = Oracle::load();
     let laws = DoubleTanh::cft_joints(&oracle.friction);
-    let k = Coefficients::from_theta12(&oracle.theta);
+    let k = ReportCoefficients::from_theta12(&oracle.theta);
     for state in &oracle.states {
         let friction: [f64; 4] = std::array::from_fn(|i| laws[i].torque(state.v[i]));
         assert_close(&friction, &state.f, TOLERANCE, "F");
         let rigid = dynamics::inverse_dynamics(&state.q, &state.v, &state.a, &k);
         let tau: [f64; 4] = std::array::from_fn(|i| rigid[i] + friction[i]);
         assert_close(&tau, &state.tau, TOLERANCE, "tau");
-        let volts = Setup::Tuedacs.torques_to_volts(&state.q, &tau).unwrap();
+        let volts = LaboratorySetup::Tuedacs
+            .torques_to_volts(&state.q, &tau)
+            .unwrap();
         assert_close(&volts, &state.volts, TOLERANCE, "volts");
         assert_close(
-            &Setup::Tuedacs.volts_to_torques(&state.q, &volts),
+            &LaboratorySetup::Tuedacs.volts_to_torques(&state.q, &volts),
             &state.tau,
             TOLERANCE,
             "tau of volts",
@@ -93,7 +95,7 @@ fn the_22_base_parameters_of_general_links_give_their_dynamics() {
     for robot in &oracle.general {
         let links = robot.links.map(PseudoInertia);
         let theta = base_parameters(&links);
-        let k = Coefficients::from_theta22(&theta);
+        let k = ReportCoefficients::from_theta22(&theta);
         let (q, v, a) = (&robot.q, &robot.v, &robot.a);
         let m = dynamics::inertia(q, &k);
         assert_close_rows(&m, &robot.m, TOLERANCE, "M");
@@ -115,7 +117,7 @@ fn the_printed_12_parameters_leave_torque_of_general_links_unexplained() {
     let robot = &oracle.general[0];
     let theta = base_parameters(&robot.links.map(PseudoInertia));
     let printed = theta.first_chunk().expect("12 of 22");
-    let m = dynamics::inertia(&robot.q, &Coefficients::from_theta12(printed));
+    let m = dynamics::inertia(&robot.q, &ReportCoefficients::from_theta12(printed));
     let missing = m[3][3] - robot.m[3][3];
     assert!(missing.abs() > 1e-3 * robot.m[3][3], "{missing}");
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::law::DriveLawKind;
-use super::unknown::{DriveQuantity, DriveUnknown, Sizes};
+use super::unknown::{DriveQuantity, DriveUnknown, JointSizes};
 
 /// A named effect of drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -100,8 +100,8 @@ impl DriveEffect {
     }
 
     /// Values from which it is fitted: of limits and delays the slope at none is zero, so they begin where they act.
-    pub fn starts(self, sizes: &[Sizes]) -> Vec<Vec<f64>> {
-        let all = |parts: &[f64], of: &dyn Fn(&Sizes, f64) -> f64| -> Vec<Vec<f64>> {
+    pub fn starts(self, sizes: &[JointSizes]) -> Vec<Vec<f64>> {
+        let all = |parts: &[f64], of: &dyn Fn(&JointSizes, f64) -> f64| -> Vec<Vec<f64>> {
             let one = |part: &f64| sizes.iter().map(|s| of(s, *part)).collect();
             parts.iter().map(one).collect()
         };

@@ -10,7 +10,7 @@ use cft_ident_core::robot::Robot;
 
 use super::law::{DriveLawKind, MachineLaw};
 use super::roll_out::{PastStates, RolledDrive, first_speed, steps};
-use super::set_point::{CommandLines, Follower};
+use super::set_point::{CommandLines, SetPointFollower};
 use super::track::DriveLog;
 
 /// Sweeps in which the impulses of friction settle.
@@ -104,15 +104,15 @@ impl RobotChains {
             q[j] = track.position[0] + of.bias;
             v[j] = first_speed(t, &track.position);
             out[j][0] = track.position[0];
-            sides.push(Side {
+            sides.push(CommandSide {
                 command: CommandLines::new(t, &track.command, log.command_is, t[0] - late),
-                follower: Follower::new(track.command[0], of.slowness),
+                follower: SetPointFollower::new(track.command[0], of.slowness),
                 past: PastStates::new(law.loop_delay, q[j], v[j]),
             });
         }
         let still = vec![0.0; n];
         let mut bias = vec![0.0; n];
-        let mut work = Work::new(n);
+        let mut work = KickWork::new(n);
         for k in 1..t.len() {
             let dt = t[k] - t[k - 1];
             let count = steps(dt);
@@ -166,14 +166,14 @@ impl RobotChains {
 }
 
 /// What stands before a controller.
-struct Side<'a> {
+struct CommandSide<'a> {
     command: CommandLines<'a>,
-    follower: Follower,
+    follower: SetPointFollower,
     past: PastStates,
 }
 
 /// Numbers of one kick.
-struct Work {
+struct KickWork {
     force: Vec<f64>,
     added: Vec<f64>,
     limit: Vec<f64>,
@@ -182,10 +182,10 @@ struct Work {
     impulse: Vec<f64>,
 }
 
-impl Work {
+impl KickWork {
     fn new(n: usize) -> Self {
         let zeros = || vec![0.0; n];
-        Work {
+        KickWork {
             force: zeros(),
             added: zeros(),
             limit: zeros(),

@@ -1,7 +1,7 @@
 //! What is wrong with a log before anything is fitted.
 
 use super::error::DriveError;
-use super::track::{DriveLog, Track};
+use super::track::{DriveLog, JointTrack};
 
 /// The numbers that decide.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +46,7 @@ pub fn check(log: &mut DriveLog) -> Result<(), DriveError> {
     Ok(())
 }
 
-fn one(file: &str, track: &Track) -> Result<Vec<String>, DriveError> {
+fn one(file: &str, track: &JointTrack) -> Result<Vec<String>, DriveError> {
     let (file, joint) = (file.to_owned(), track.joint.clone());
     let ([q0, q1], [c0, c1]) = (range(&track.position), range(&track.command));
     let (moved, asked) = (q1 - q0, c1 - c0);
@@ -82,7 +82,7 @@ fn one(file: &str, track: &Track) -> Result<Vec<String>, DriveError> {
 }
 
 /// Ends at which the joint stands while the command goes on.
-fn stops(track: &Track, ends: [f64; 2]) -> Vec<String> {
+fn stops(track: &JointTrack, ends: [f64; 2]) -> Vec<String> {
     let moved = ends[1] - ends[0];
     let mut out = Vec::new();
     for (end, side) in ends.into_iter().zip([-1.0, 1.0]) {
@@ -117,12 +117,12 @@ mod tests {
             motion: "m".to_owned(),
             facts: Vec::new(),
             command_is: CommandIs::Held,
-            joints: vec![Track {
+            joints: vec![JointTrack {
                 joint: "servo".to_owned(),
                 command: t.iter().map(|t| command(*t)).collect(),
                 position: t.iter().map(|t| position(*t)).collect(),
                 kp: 16.0,
-                ..Track::default()
+                ..JointTrack::default()
             }],
             t,
             load: DriveLoad::Unknown,

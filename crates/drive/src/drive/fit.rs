@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::chain::RobotChains;
 use super::roll_out::roll_axis;
 use super::track::{DriveLoad, DriveLog, median};
-use super::unknown::{DriveUnknown, Sizes, UnknownFrame};
+use super::unknown::{DriveUnknown, JointSizes, UnknownFrame};
 
 /// The numbers that decide in a fit.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +46,7 @@ pub struct LogPiece {
 pub struct DriveProblem<'a> {
     pub logs: &'a [&'a DriveLog],
     pub frame: UnknownFrame,
-    pub sizes: Vec<Sizes>,
+    pub sizes: Vec<JointSizes>,
     pub pieces: Vec<LogPiece>,
     pub blocks: usize,
     pub chains: Option<&'a RobotChains>,
@@ -54,22 +54,22 @@ pub struct DriveProblem<'a> {
 
 /// Sums over a piece: H = sum w J J', g = sum w J r, and the loss.
 #[derive(Debug, Clone)]
-pub struct Sums {
+pub struct PieceSums {
     pub h: DMatrix<f64>,
     pub g: DVector<f64>,
     pub loss: f64,
 }
 
-impl Sums {
+impl PieceSums {
     pub fn zero(p: usize) -> Self {
-        Sums {
+        PieceSums {
             h: DMatrix::zeros(p, p),
             g: DVector::zeros(p),
             loss: 0.0,
         }
     }
 
-    pub fn add(&mut self, other: &Sums) {
+    pub fn add(&mut self, other: &PieceSums) {
         self.h += &other.h;
         self.g += &other.g;
         self.loss += other.loss;
@@ -194,11 +194,11 @@ impl DriveProblem<'_> {
         unknowns: &[DriveUnknown],
         values: &[f64],
         scales: &ResidualScales,
-    ) -> Vec<Sums> {
+    ) -> Vec<PieceSums> {
         let p = unknowns.len();
         let steps = self.differences(unknowns, values);
         let together = self.together(unknowns);
-        let of_log = |(l, log): (usize, &&DriveLog)| -> Vec<Sums> {
+        let of_log = |(l, log): (usize, &&DriveLog)| -> Vec<PieceSums> {
             let base = self.positions(log, unknowns, values);
             let mut r = base.clone();
             subtract(&mut r, log);
@@ -221,7 +221,7 @@ impl DriveProblem<'_> {
             own.map(|piece| sums(p, piece, &r, &columns, &scales[l]))
                 .collect()
         };
-        let all: Vec<Vec<Sums>> = self.logs.par_iter().enumerate().map(of_log).collect();
+        let all: Vec<Vec<PieceSums>> = self.logs.par_iter().enumerate().map(of_log).collect();
         all.into_iter().flatten().collect()
     }
 
@@ -253,9 +253,9 @@ impl DriveProblem<'_> {
     }
 
     /// Sums by block of the jackknife.
-    pub fn by_block(&self, pieces: &[Sums]) -> Vec<Sums> {
+    pub fn by_block(&self, pieces: &[PieceSums]) -> Vec<PieceSums> {
         let p = pieces.first().map_or(0, |sums| sums.g.len());
-        let mut out = vec![Sums::zero(p); self.blocks];
+        let mut out = vec![PieceSums::zero(p); self.blocks];
         for (piece, sums) in self.pieces.iter().zip(pieces) {
             out[piece.block].add(sums);
         }
@@ -275,7 +275,7 @@ impl DriveProblem<'_> {
         let mut loss = self.loss(unknowns, &values, scales);
         let (mut damping, mut converged) = (1e-3, false);
         for _ in 0..most {
-            let mut all = Sums::zero(unknowns.len());
+            let mut all = PieceSums::zero(unknowns.len());
             for sums in self.linearised(unknowns, &values, scales) {
                 all.add(&sums);
             }
@@ -340,8 +340,8 @@ fn sums(
     r: &[Vec<f64>],
     columns: &[Vec<Column>],
     scales: &[f64],
-) -> Sums {
-    let mut out = Sums::zero(p);
+) -> PieceSums {
+    let mut out = PieceSums::zero(p);
     for ((r, scale), columns) in r.iter().zip(scales).zip(columns) {
         for (k, error) in r.iter().enumerate().take(piece.to).skip(piece.from) {
             let (loss, weight) = robust(error / scale);
@@ -366,7 +366,7 @@ fn sums(
 }
 
 /// A damped step within bounds: what stands at a bound and is pushed beyond is held there.
-fn bounded_step(all: &Sums, values: &[f64], bounds: &[[f64; 2]], damping: f64) -> Vec<f64> {
+fn bounded_step(all: &PieceSums, values: &[f64], bounds: &[[f64; 2]], damping: f64) -> Vec<f64> {
     let p = values.len();
     let mut held: Vec<bool> = (0..p)
         .map(|i| {
@@ -403,7 +403,7 @@ fn bounded_step(all: &Sums, values: &[f64], bounds: &[[f64; 2]], damping: f64) -
 }
 
 /// -(H + damping diag H)^-1 g over some unknowns.
-pub fn solve_free(all: &Sums, free: &[usize], damping: f64) -> Option<DVector<f64>> {
+pub fn solve_free(all: &PieceSums, free: &[usize], damping: f64) -> Option<DVector<f64>> {
     let n = free.len();
     // scaled to a unit diagonal: units differ by many powers of ten
     let size: Vec<f64> = free.iter().map(|i| all.h[(*i, *i)].sqrt()).collect();

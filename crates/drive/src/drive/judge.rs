@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::fit::{Sums, solve_free};
+use super::fit::{PieceSums, solve_free};
 use super::unknown::DriveUnknown;
 
 /// The numbers that decide.
@@ -61,9 +61,9 @@ pub struct BlockJackknife {
 
 impl BlockJackknife {
     /// At a fitted point.
-    pub fn new(unknowns: &[DriveUnknown], values: &[f64], blocks: &[Sums]) -> Self {
+    pub fn new(unknowns: &[DriveUnknown], values: &[f64], blocks: &[PieceSums]) -> Self {
         let p = unknowns.len();
-        let mut total = Sums::zero(p);
+        let mut total = PieceSums::zero(p);
         for block in blocks {
             total.add(block);
         }
@@ -109,7 +109,7 @@ impl BlockJackknife {
     }
 
     /// Loss of every block by the unknowns of the others.
-    pub fn left_out(&self, blocks: &[Sums]) -> Vec<f64> {
+    pub fn left_out(&self, blocks: &[PieceSums]) -> Vec<f64> {
         let pairs = blocks.iter().zip(&self.changes);
         pairs.map(|(block, change)| block.loss_at(change)).collect()
     }

@@ -11,14 +11,14 @@ use super::search::{Step, StepCertainty};
 use super::unknown::{DriveQuantity, DriveUnknown};
 
 /// Name, unit and meaning of a quantity, and the value that is shown of it with its slope.
-struct Shown {
+struct ShownQuantity {
     name: &'static str,
     unit: &'static str,
     over_inertia: &'static str,
     meaning: &'static str,
 }
 
-fn shown(quantity: DriveQuantity, volts: bool) -> Shown {
+fn shown(quantity: DriveQuantity, volts: bool) -> ShownQuantity {
     let (name, unit, over_inertia, meaning) = match quantity {
         DriveQuantity::Stiffness => (
             "stiffness",
@@ -71,7 +71,7 @@ fn shown(quantity: DriveQuantity, volts: bool) -> Shown {
         ),
         DriveQuantity::Offset => ("torque_offset", "N m", "rad/s^2", "constant torque"),
     };
-    Shown {
+    ShownQuantity {
         name,
         unit,
         over_inertia,

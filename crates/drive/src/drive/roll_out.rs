@@ -5,7 +5,7 @@
 //! against the motion (Moreau 1988): a joint that rests stays at rest, and the motion is continuous in every number.
 
 use super::law::{DriveLawKind, JointLaw, MachineLaw};
-use super::set_point::{CommandLines, Follower};
+use super::set_point::{CommandLines, SetPointFollower};
 use super::track::{DriveLoad, DriveLog};
 
 /// Longest step [s]. Half: positions of the measured servo move by under 0.1 mrad; twice: by 0.5 mrad.
@@ -92,7 +92,7 @@ pub fn roll_axis(
     let t = &log.t;
     let late = law.command_delay + law.loop_delay;
     let mut command = CommandLines::new(t, &track.command, log.command_is, t[0] - late);
-    let mut follower = Follower::new(track.command[0], of.slowness);
+    let mut follower = SetPointFollower::new(track.command[0], of.slowness);
     let mut q = track.position[0] + of.bias;
     let mut v = first_speed(t, &track.position);
     let mut past = PastStates::new(law.loop_delay, q, v);

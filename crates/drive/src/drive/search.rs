@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::candidate::DriveEffect;
-use super::fit::{DriveProblem, NUMBERS as FIT, ResidualScales, Sums};
+use super::fit::{DriveProblem, NUMBERS as FIT, PieceSums, ResidualScales};
 use super::judge::{self, BlockJackknife, JudgedDriveEffect, NUMBERS};
 use super::start;
 use super::unknown::{DriveQuantity, DriveUnknown};
@@ -21,7 +21,7 @@ pub struct LawEstimate {
     pub values: Vec<f64>,
     pub converged: bool,
     pub scales: ResidualScales,
-    pub blocks: Vec<Sums>,
+    pub blocks: Vec<PieceSums>,
     pub jackknife: BlockJackknife,
 }
 

@@ -71,20 +71,20 @@ impl<'a> CommandLines<'a> {
 
 /// A set point that runs after its command no faster than it may.
 #[derive(Debug, Clone, Copy)]
-pub struct Follower {
+pub struct SetPointFollower {
     at: f64,
     /// Longest way of one second [rad].
     v_max: f64,
 }
 
-impl Follower {
+impl SetPointFollower {
     pub fn new(at: f64, slowness: f64) -> Self {
         let v_max = if slowness > 0.0 {
             1.0 / slowness
         } else {
             f64::INFINITY
         };
-        Follower { at, v_max }
+        SetPointFollower { at, v_max }
     }
 
     /// Mean of the set point from where the last step ended up to a time.
@@ -140,7 +140,7 @@ mod tests {
     /// Mean of the set point over a span, of a command that is followed at any speed.
     fn mean(t: &[f64], x: &[f64], kind: CommandIs, [from, to]: [f64; 2]) -> f64 {
         let mut command = CommandLines::new(t, x, kind, from);
-        Follower::new(x[0], 0.0).mean_up_to(&mut command, to)
+        SetPointFollower::new(x[0], 0.0).mean_up_to(&mut command, to)
     }
 
     #[test]
@@ -171,7 +171,7 @@ mod tests {
             for slowness in [0.0, 0.2] {
                 let total = |late: f64| -> f64 {
                     let mut command = CommandLines::new(&t, &x, kind, -late);
-                    let mut follower = Follower::new(0.0, slowness);
+                    let mut follower = SetPointFollower::new(0.0, slowness);
                     let ends = (1..190).map(|k| f64::from(k) * h);
                     ends.map(|end| follower.mean_up_to(&mut command, end - late))
                         .sum()
@@ -192,7 +192,7 @@ mod tests {
     fn a_slow_set_point_runs_at_its_speed_and_arrives() {
         let steps = |count: usize| {
             let mut command = CommandLines::new(&[0.0, 1.0], &[1.0, 1.0], CommandIs::Held, 0.0);
-            let mut follower = Follower::new(0.0, 0.2);
+            let mut follower = SetPointFollower::new(0.0, 0.2);
             let ends = (1..=count).map(|k| 2.5e-3 * k as f64);
             ends.map(|end| follower.mean_up_to(&mut command, end))
                 .last()
@@ -212,7 +212,7 @@ mod tests {
             for slowness in [0.05, 0.2, 1.0] {
                 let means = |h: f64, count: usize| -> Vec<f64> {
                     let mut command = CommandLines::new(&t, &x, kind, -0.0312);
-                    let mut follower = Follower::new(x[0], slowness);
+                    let mut follower = SetPointFollower::new(x[0], slowness);
                     let ends = (1..=count).map(|k| h * k as f64 - 0.0312);
                     ends.map(|end| follower.mean_up_to(&mut command, end))
                         .collect()
@@ -231,7 +231,7 @@ mod tests {
         let t: Vec<f64> = (0..100).map(|k| 2.5e-3 * f64::from(k)).collect();
         let x: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
         let mut command = CommandLines::new(&t, &x, CommandIs::Linear, 0.0);
-        let mut follower = Follower::new(0.0, 0.2);
+        let mut follower = SetPointFollower::new(0.0, 0.2);
         for k in 1..100 {
             let mean = 0.5 * (x[k - 1] + x[k]);
             assert!((follower.mean_up_to(&mut command, t[k]) - mean).abs() < 1e-12);

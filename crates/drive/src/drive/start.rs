@@ -4,8 +4,8 @@ use super::chain::RobotChains;
 use super::fit::DriveProblem;
 use super::law::DriveLawKind;
 use super::track::median;
-use super::track::{DriveLoad, DriveLog, Track};
-use super::unknown::{DriveQuantity, DriveUnknown, Sizes};
+use super::track::{DriveLoad, DriveLog, JointTrack};
+use super::unknown::{DriveQuantity, DriveUnknown, JointSizes};
 
 /// Starts that are fitted, best first.
 const TRIED: usize = 3;
@@ -32,15 +32,19 @@ fn speeds(t: &[f64], q: &[f64]) -> Vec<f64> {
 }
 
 /// Sizes of every joint over logs.
-pub fn sizes(logs: &[&DriveLog], kind: DriveLawKind, chains: Option<&RobotChains>) -> Vec<Sizes> {
+pub fn sizes(
+    logs: &[&DriveLog],
+    kind: DriveLawKind,
+    chains: Option<&RobotChains>,
+) -> Vec<JointSizes> {
     let joints = logs.first().map_or(0, |log| log.joints.len());
     let links = chains.map(RobotChains::usual_inertia);
     (0..joints)
         .map(|j| {
             let tracks = || logs.iter().map(move |log| (log, &log.joints[j]));
-            let moving = |(log, track): (&&DriveLog, &Track)| speeds(&log.t, &track.position);
+            let moving = |(log, track): (&&DriveLog, &JointTrack)| speeds(&log.t, &track.position);
             let speed = quantile(tracks().flat_map(moving).collect(), 0.99).max(1e-3);
-            let off = |(_, track): (&&DriveLog, &Track)| {
+            let off = |(_, track): (&&DriveLog, &JointTrack)| {
                 let pairs = track.command.iter().zip(&track.position);
                 pairs.map(|(c, q)| (c - q).abs()).collect::<Vec<f64>>()
             };
@@ -69,7 +73,7 @@ pub fn sizes(logs: &[&DriveLog], kind: DriveLawKind, chains: Option<&RobotChains
                 (DriveLawKind::Torque, DriveLoad::Robot) => kp * error,
                 _ => gravity.max(inertia * speed * speed / error),
             };
-            Sizes {
+            JointSizes {
                 inertia,
                 torque,
                 speed,

@@ -13,7 +13,7 @@ pub struct DriveLog {
     pub t: Vec<f64>,
     /// How the command runs between samples.
     pub command_is: CommandIs,
-    pub joints: Vec<Track>,
+    pub joints: Vec<JointTrack>,
     pub load: DriveLoad,
     /// What the file says wrongly, or does not say.
     pub findings: Vec<String>,
@@ -30,7 +30,7 @@ pub enum CommandIs {
 
 /// One joint along a log.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Track {
+pub struct JointTrack {
     pub joint: String,
     /// Commanded position [rad].
     pub command: Vec<f64>,

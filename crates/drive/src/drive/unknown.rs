@@ -64,7 +64,7 @@ pub const LATEST: f64 = 0.3;
 
 /// How large the numbers of a joint are: what steps of differences and starts are measured with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sizes {
+pub struct JointSizes {
     /// [kg m^2]
     pub inertia: f64,
     /// [N m]
@@ -77,7 +77,7 @@ pub struct Sizes {
     pub farthest: f64,
 }
 
-impl Sizes {
+impl JointSizes {
     /// What one part in a thousand of is a small change of a quantity.
     pub fn of(&self, quantity: DriveQuantity) -> f64 {
         match quantity {

@@ -4,12 +4,12 @@ use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
 
 use super::dissipative::damping_and_friction;
 use super::error::ExportError;
-use super::prepared::{Drive, Prepared, drive, joint_name, placed, root};
+use super::prepared::{Drive, PreparedModel, drive, joint_name, placed, root};
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::effect::as_code::Property;
+use cft_ident_core::effect::as_code::RobotProperty;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::{Body, STANDARD, pseudo_inertia};
-use cft_ident_core::robot::tree::Coupling;
+use cft_ident_core::robot::tree::JointCoupling;
 use cft_ident_core::robot::tree::space::{Rotation, Vector, cross, times};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::robot_file::CoordinateLimits;
@@ -17,7 +17,7 @@ use cft_ident_files::config::serial_section::FrameSection;
 
 /// What a format can say beside bodies, joints, damping and friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Says {
+pub struct FormatSupport {
     /// Inertia of a drive at its joint.
     pub armature: bool,
     /// Inertia and friction that two joints share.
@@ -34,7 +34,7 @@ pub struct Arm {
     pub links: Vec<ArmLink>,
     pub frames: Vec<FrameSection>,
     /// Gear trains that two joints turn, with inertia, damping and friction.
-    pub couplings: Vec<(Coupling, [f64; 3])>,
+    pub couplings: Vec<(JointCoupling, [f64; 3])>,
     /// Where the inertials come from.
     pub of_inertials: &'static [&'static str],
     /// Places in the model of the effects that are in bodies, gravity and armatures.
@@ -95,7 +95,7 @@ impl Arm {
     /// [`ExportError::NoLinks`] for robots that are no such tree; [`ExportError::Impossible`] for a link that
     /// no body can be.
     pub fn of(file: &ModelFile, refined: &AugmentedModel) -> Result<Self, ExportError> {
-        let prepared = Prepared::of(file, &refined.model)?;
+        let prepared = PreparedModel::of(file, &refined.model)?;
         let (file, robot) = (&prepared.file, &prepared.model.robot);
         let links = robot.tree().links();
         let (bodies, drives) = prepared.standard.values.split_at(links.len() * STANDARD);
@@ -195,14 +195,14 @@ impl Arm {
 }
 
 /// Takes an effect into bodies, drives or gravity, where it is one of these.
-fn fold(property: Property, bodies: &mut [f64], drives: &mut [f64], gravity: &mut Vector) {
+fn fold(property: RobotProperty, bodies: &mut [f64], drives: &mut [f64], gravity: &mut Vector) {
     match property {
-        Property::Drive { joint, inertia } => drives[joint] += inertia,
-        Property::Gravity([gx, gy]) => {
+        RobotProperty::Drive { joint, inertia } => drives[joint] += inertia,
+        RobotProperty::Gravity([gx, gy]) => {
             gravity[0] += gx;
             gravity[1] += gy;
         }
-        Property::Body(body) => {
+        RobotProperty::Body(body) => {
             let first = bodies.len() - STANDARD;
             for (sum, x) in bodies[first..].iter_mut().zip(body.standard()) {
                 *sum += x;

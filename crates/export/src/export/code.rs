@@ -8,9 +8,9 @@ use cft_ident_core::effect::as_code::EffectsCode;
 use cft_ident_core::effect::law_text::{exact, law};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::STANDARD;
-use cft_ident_core::robot::tree::{Coordinate, Coupling};
+use cft_ident_core::robot::tree::{Coordinate, JointCoupling};
 
-pub(super) struct Language {
+pub(super) struct CodeLanguage {
     /// A table: type, name with its sizes, values; `$` stands for each.
     table: fn(kind: &str, name: &str, sizes: &[usize], values: &str) -> String,
     open: char,
@@ -22,7 +22,7 @@ pub(super) struct Language {
     temperature: &'static str,
 }
 
-pub(super) const C: Language = Language {
+pub(super) const C: CodeLanguage = CodeLanguage {
     table: |kind, name, sizes, values| {
         let kind = if kind == "f64" { "double" } else { "int" };
         let sizes: String = sizes.iter().map(|n| format!("[{n}]")).collect();
@@ -35,7 +35,7 @@ pub(super) const C: Language = Language {
     temperature: ", const double temperature[@N@]",
 };
 
-pub(super) const RUST: Language = Language {
+pub(super) const RUST: CodeLanguage = CodeLanguage {
     table: |kind, name, sizes, values| {
         let sizes = sizes.iter().rev();
         let kind = sizes.fold(kind.to_owned(), |kind, n| format!("[{kind}; {n}]"));
@@ -48,7 +48,7 @@ pub(super) const RUST: Language = Language {
     temperature: ", temperature: &[f64; JOINTS]",
 };
 
-impl Language {
+impl CodeLanguage {
     /// Nested values, one row of the innermost to a line.
     fn nested(&self, values: &[String], sizes: &[usize]) -> String {
         let Some((size, inner)) = sizes.split_first() else {
@@ -238,7 +238,7 @@ pub(super) fn drives(program: &Program) -> Vec<String> {
 /// Statements for a coupled gear train with these texts for inertia, viscous and Coulomb part.
 pub(super) fn train(
     k: usize,
-    c: &Coupling,
+    c: &JointCoupling,
     [inertia, viscous, coulomb]: [String; 3],
 ) -> [String; 3] {
     let (m, o, ratio) = (c.motor, c.other, exact(c.ratio));

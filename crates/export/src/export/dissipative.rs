@@ -5,7 +5,7 @@
 
 use super::error::ExportError;
 use cft_ident_core::effect::as_code::EffectsCode;
-use cft_ident_core::effect::{AugmentedModel, Scene, Torques};
+use cft_ident_core::effect::{AugmentedModel, EffectScene, StretchTorques};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
 use cft_ident_core::robot::friction::ViscousCoulomb;
@@ -56,8 +56,12 @@ fn friction_at(refined: &AugmentedModel, of_friction: &[usize], v: Vec<Vec<f64>>
 }
 
 /// What effects see of a model along a stretch.
-pub(super) fn scene<'a>(model: &'a Model, stretch: &'a Stretch, torques: &'a Torques) -> Scene<'a> {
-    Scene {
+pub(super) fn scene<'a>(
+    model: &'a Model,
+    stretch: &'a Stretch,
+    torques: &'a StretchTorques,
+) -> EffectScene<'a> {
+    EffectScene {
         robot: &model.robot,
         theta: &model.theta,
         laws: &model.friction,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::arm::{Arm, Says};
+use super::arm::{Arm, FormatSupport};
 use super::dissipative::{damping_and_friction, scene};
 use super::error::ExportError;
 use super::prepared::hashed;
@@ -24,7 +24,8 @@ pub struct LeftOut {
     pub percent_of_torque: Option<f64>,
 }
 
-struct Part<'a> {
+/// A part of the model that a file cannot say, with the torque that it is worth.
+struct OmittedPart<'a> {
     what: String,
     torque: Box<Torque<'a>>,
 }
@@ -36,7 +37,7 @@ type Torque<'a> = dyn Fn(&Stretch, &[Vec<f64>]) -> Vec<Vec<f64>> + 'a;
 pub fn left_out(
     arm: &Arm,
     refined: &AugmentedModel,
-    says: Says,
+    says: FormatSupport,
     stretches: &[Stretch],
 ) -> Vec<LeftOut> {
     let parts = parts(arm, refined, says);
@@ -70,14 +71,18 @@ pub fn left_out(
     shown.collect()
 }
 
-fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<'a>> {
+fn parts<'a>(
+    arm: &'a Arm,
+    refined: &'a AugmentedModel,
+    says: FormatSupport,
+) -> Vec<OmittedPart<'a>> {
     let model = &refined.model;
     let n = model.robot.joints();
     let names = model.robot.joint_names();
-    let mut out: Vec<Part> = Vec::new();
+    let mut out: Vec<OmittedPart> = Vec::new();
     // one joint's torque by its state
     let mut of_joint = |what: String, j: usize, f: Box<dyn Fn(f64, f64) -> f64 + 'a>| {
-        out.push(Part {
+        out.push(OmittedPart {
             what,
             torque: Box::new(move |s, _| {
                 let mut all = vec![vec![0.0; s.len()]; n];
@@ -114,7 +119,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
     if !(says.couplings && arm.trains().is_some()) {
         for (c, [inertia, viscous, coulomb]) in &arm.couplings {
             let (m, o, r) = (c.motor, c.other, c.ratio);
-            out.push(Part {
+            out.push(OmittedPart {
                 what: format!("gear train of {} that {} turns too", names[m], names[o]),
                 torque: Box::new(move |s, _| {
                     let mut all = vec![vec![0.0; s.len()]; n];
@@ -133,7 +138,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
             continue;
         }
         let late = (0..n).any(|j| effect.shift(j) != 0.0);
-        out.push(Part {
+        out.push(OmittedPart {
             what: effect.title(&model.robot),
             torque: Box::new(move |s, hat| {
                 if late {
@@ -159,7 +164,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
 
 /// Where what a file cannot say is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Elsewhere {
+pub enum OmissionPlace {
     /// Nowhere.
     Nowhere,
     /// In the model file beside a URDF.
@@ -167,7 +172,7 @@ pub enum Elsewhere {
 }
 
 /// The list as lines for the head of a file; `logs` names the logs of the sizes.
-pub fn lines(left_out: &[LeftOut], logs: &[String], elsewhere: Elsewhere) -> Vec<String> {
+pub fn lines(left_out: &[LeftOut], logs: &[String], elsewhere: OmissionPlace) -> Vec<String> {
     if left_out.is_empty() {
         return vec!["Nothing of the model's torque is left out.".to_owned()];
     }
@@ -179,8 +184,8 @@ pub fn lines(left_out: &[LeftOut], logs: &[String], elsewhere: Elsewhere) -> Vec
         ),
     };
     let head = match elsewhere {
-        Elsewhere::Nowhere => "NOT in here, though the model has it",
-        Elsewhere::Beside => "Not in the URDF, but in the model file beside it",
+        OmissionPlace::Nowhere => "NOT in here, though the model has it",
+        OmissionPlace::Beside => "Not in the URDF, but in the model file beside it",
     };
     let mut out = vec![format!("{head} ({along}):")];
     for part in left_out {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::arm::{Arm, ArmJoint, ArmLink, Says, quaternion};
+use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, quaternion};
 use super::prepared::{in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::Body;
@@ -12,7 +12,7 @@ use cft_ident_core::robot::tree::space::of_roll_pitch_yaw;
 use cft_ident_files::config::MjcfJoint;
 
 /// What MJCF can say.
-pub const SAYS: Says = Says {
+pub const SAYS: FormatSupport = FormatSupport {
     armature: true,
     couplings: true,
 };

@@ -6,7 +6,7 @@ use super::Program;
 use super::code::{self, RUST, carried, fall, sines, without_memory};
 use super::functions;
 use super::note::Note;
-use cft_ident_core::effect::as_code::{EffectsCode, INERTIA, Remembered};
+use cft_ident_core::effect::as_code::{EffectsCode, INERTIA, StateVariable};
 
 const TEMPLATE: &str = include_str!("module.rs.in");
 
@@ -41,7 +41,7 @@ pub fn module(program: &Program, note: &Note) -> String {
     tables += &RUST.vector("FALL", &fall(program));
     let (mut fields, mut init) = (String::new(), String::new());
     for memory in &effects.memory {
-        let Remembered { name, first, .. } = memory;
+        let StateVariable { name, first, .. } = memory;
         let _ = writeln!(fields, "    /// {}", memory.what);
         let (kind, first) = match memory.size {
             None => ("f64".to_owned(), first.clone()),

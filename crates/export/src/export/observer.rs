@@ -1,8 +1,8 @@
 //! The observer of external torques in generated code: filters of one sampling step, deviations and limits as tables.
 
 use super::Program;
-use super::code::{C, Language, RUST, fall, train};
-use super::recipe::{Late, Recipe};
+use super::code::{C, CodeLanguage, RUST, fall, train};
+use super::recipe::{DelayRecipe, ObserverRecipe};
 use cft_ident_core::effect::law_text::{exact, slopes};
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
@@ -14,7 +14,7 @@ const IN_RUST: &str = include_str!("observer.rs.in");
 /// Beyond every speed.
 const NEVER: f64 = 1e300;
 
-impl Late {
+impl DelayRecipe {
     /// Of each joint: how many samples ago the oldest of four nodes lies, and their weights (cubic interpolation).
     fn nodes(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut oldest, mut weights) = (Vec::new(), Vec::new());
@@ -60,7 +60,7 @@ const LATE_IN_RUST: &str = "\
             }
         }";
 
-impl Recipe {
+impl ObserverRecipe {
     pub(super) fn in_c(&self, program: &Program) -> String {
         let plain = "    for (j = 0; j < N; j++) y[j] = r[2][N + j] - model[j];";
         let fields = "    double measured[@D@][@N@], modelled[@D@][@N@];\n    int late;\n";
@@ -81,7 +81,7 @@ impl Recipe {
     fn text(
         &self,
         program: &Program,
-        (template, language): (&str, &Language),
+        (template, language): (&str, &CodeLanguage),
         (plain, late): (&str, &str),
         of_late: [&str; 3],
     ) -> String {
@@ -114,7 +114,7 @@ impl Recipe {
     }
 
     /// Tables of the parameters' deviations.
-    fn of_parameters(&self, language: &Language, program: &Program) -> String {
+    fn of_parameters(&self, language: &CodeLanguage, program: &Program) -> String {
         let (u, n) = (self.uncertain.len(), program.joints.len());
         let (links, trains) = (program.tree.links().len(), program.couplings.len());
         // a module of Rust has it already
@@ -142,7 +142,7 @@ impl Recipe {
     }
 
     /// Statements for what friction and coupled gear trains add to a deviation.
-    fn beside_links(&self, language: &Language, program: &Program) -> String {
+    fn beside_links(&self, language: &CodeLanguage, program: &Program) -> String {
         let mut lines = Vec::new();
         for (k, (coupling, _)) in program.couplings.iter().enumerate() {
             let numbers = [0, 1, 2].map(|i| format!("UNCERTAIN_TRAIN[k][{k}][{i}]"));
@@ -160,7 +160,7 @@ impl Recipe {
         if text.is_empty() { text } else { text + "\n" }
     }
 
-    fn tables(&self, language: &Language, edges: usize) -> String {
+    fn tables(&self, language: &CodeLanguage, edges: usize) -> String {
         let n = self.joints.len();
         let mut out = String::new();
         for (name, cascade) in [("POSITION", &self.position), ("SMOOTH", &self.smooth)] {

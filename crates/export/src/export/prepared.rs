@@ -2,7 +2,7 @@
 
 use super::error::ExportError;
 use super::single;
-use super::standard::{Standard, nearest};
+use super::standard::{StandardParameters, nearest};
 use cft_ident_core::robot::model::Model;
 use cft_ident_core::robot::standard::Body;
 use cft_ident_core::robot::tree::space::{Rotation, Vector, about, add, product, times, turn};
@@ -12,17 +12,17 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::serial_section::InertialSection;
 
 /// A model whose links have bodies.
-pub(super) struct Prepared {
+pub(super) struct PreparedModel {
     /// The model's file; that of a chain of one link where the model is of a single joint.
     pub file: ModelFile,
     pub model: Model,
     /// Standard parameters of links and drives.
-    pub standard: Standard,
+    pub standard: StandardParameters,
     /// What is said of where they come from.
     pub of_inertials: &'static [&'static str],
 }
 
-impl Prepared {
+impl PreparedModel {
     /// Links of a model.
     ///
     /// # Errors

@@ -2,13 +2,13 @@
 
 use super::dissipative::driving;
 use super::error::ExportError;
-use super::recipe::Recipe;
+use super::recipe::ObserverRecipe;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::EffectsCode;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::standard::STANDARD;
-use cft_ident_core::robot::tree::{Coupling, Tree};
+use cft_ident_core::robot::tree::{JointCoupling, Tree};
 use cft_ident_files::config::RobotFile;
 
 /// Tree, link parameters, drives, friction and offsets of a model.
@@ -26,7 +26,7 @@ pub struct Program {
     /// Drive inertia of each joint [kg or kg m^2]; 0 where it is grouped into a link.
     pub drives: Vec<f64>,
     /// Coupled gear trains, each with inertia, viscous and Coulomb part.
-    pub couplings: Vec<(Coupling, [f64; 3])>,
+    pub couplings: Vec<(JointCoupling, [f64; 3])>,
     /// Friction of each joint.
     pub friction: Vec<JointFriction>,
     /// Constant torque of each joint [N or Nm].
@@ -34,7 +34,7 @@ pub struct Program {
     /// What effects add.
     pub effects: EffectsCode,
     /// The observer of external torques, where one is asked for.
-    pub observer: Option<Recipe>,
+    pub observer: Option<ObserverRecipe>,
     /// Speeds from and to which the friction of a joint would drive it; none where it always takes power.
     pub drives_at: Vec<Option<[f64; 2]>>,
     /// Speed of each joint below which it may be at rest [m/s or rad/s].

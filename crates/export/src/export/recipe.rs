@@ -4,7 +4,7 @@ use cft_ident_core::robot::standard::STANDARD;
 
 /// A cascade of second-order sections.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cascade {
+pub struct FilterCascade {
     /// b0, b1, b2, a1, a2 of each.
     pub sections: Vec<[f64; 5]>,
     /// Their states after a long constant input of 1.
@@ -15,7 +15,7 @@ pub struct Cascade {
 
 /// Torques of the last samples, where the model's come late or early.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Late {
+pub struct DelayRecipe {
     /// Samples by which the torque of each joint is late.
     pub by: Vec<f64>,
     /// Samples that are waited for.
@@ -26,7 +26,7 @@ pub struct Late {
 
 /// External torques of a joint that nothing touches.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Untouched {
+pub struct UntouchedTorques {
     /// Edges of ranges of speed [m/s or rad/s].
     pub speed_edges: Vec<f64>,
     /// Deviation in each range, that by the parameters aside \[N or Nm\].
@@ -39,7 +39,7 @@ pub struct Untouched {
 
 /// Parameters whose torque is one deviation of the model's.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Uncertain {
+pub struct ParameterDeviation {
     /// Standard parameters of each link.
     pub bodies: Vec<[f64; STANDARD]>,
     /// Drive inertia of each joint [kg or kg m^2].
@@ -54,7 +54,7 @@ pub struct Uncertain {
 
 /// All that an observer is written from.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recipe {
+pub struct ObserverRecipe {
     /// From row to row \[s\].
     pub step_s: f64,
     /// Time by which external torques are late \[s\].
@@ -62,11 +62,11 @@ pub struct Recipe {
     /// False alarms an hour.
     pub per_hour: f64,
     /// Of positions and torques; `settle` counts the rows before the first sample.
-    pub position: Cascade,
+    pub position: FilterCascade,
     /// Of external torques and speeds.
-    pub smooth: Cascade,
-    pub late: Option<Late>,
-    pub joints: Vec<Untouched>,
+    pub smooth: FilterCascade,
+    pub late: Option<DelayRecipe>,
+    pub joints: Vec<UntouchedTorques>,
     /// Deviations of the model's torque by its parameters.
-    pub uncertain: Vec<Uncertain>,
+    pub uncertain: Vec<ParameterDeviation>,
 }

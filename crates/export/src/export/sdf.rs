@@ -2,13 +2,13 @@
 
 use std::fmt::Write;
 
-use super::arm::{Arm, ArmJoint, ArmLink, Says};
+use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport};
 use super::prepared::{MOMENTS, in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::roll_pitch_yaw;
 
 /// What SDF can say: a drive's inertia has no element, and joints share nothing.
-pub const SAYS: Says = Says {
+pub const SAYS: FormatSupport = FormatSupport {
     armature: false,
     couplings: false,
 };

@@ -13,7 +13,7 @@ use cft_ident_files::config::serial_section::InertialSection;
 
 /// What torques determine of a standard parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Identifiability {
+pub enum ParameterIdentifiability {
     /// Its value.
     Alone,
     /// Only the sum of it and others.
@@ -27,9 +27,9 @@ const UNTOLD_MASS: f64 = 1.0;
 
 /// Standard parameters of every link, then of the drives, and whether torques determine them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Standard {
+pub struct StandardParameters {
     pub values: Vec<f64>,
-    pub identifiability: Vec<Identifiability>,
+    pub identifiability: Vec<ParameterIdentifiability>,
     /// Whether the priors give these torques as they are.
     pub is_prior: bool,
 }
@@ -44,7 +44,7 @@ pub fn nearest(
     theta: &[f64],
     priors: &[Option<InertialSection>],
     drives: &[f64],
-) -> Standard {
+) -> StandardParameters {
     let p = robot.standard_parameters();
     let links = robot.tree().links().len();
     let mut x = DVector::zeros(p);
@@ -68,7 +68,7 @@ pub fn nearest(
     let theta = DVector::from_column_slice(&theta[..rows]);
     // every row has a column of its own, so that B B' is positive definite
     let gram = &b * b.transpose();
-    let mut identifiability = vec![Identifiability::Nothing; p];
+    let mut identifiability = vec![ParameterIdentifiability::Nothing; p];
     if let Some(factor) = gram.cholesky() {
         // a second step, for the last digits
         for _ in 0..2 {
@@ -79,14 +79,14 @@ pub fn nearest(
         for (i, identifiability) in identifiability.iter_mut().enumerate() {
             let share = b.column(i).dot(&shares.column(i));
             *identifiability = match share {
-                share if share > 1.0 - 1e-9 => Identifiability::Alone,
-                share if share > 1e-9 => Identifiability::InSum,
-                _ => Identifiability::Nothing,
+                share if share > 1.0 - 1e-9 => ParameterIdentifiability::Alone,
+                share if share > 1e-9 => ParameterIdentifiability::InSum,
+                _ => ParameterIdentifiability::Nothing,
             };
         }
     }
     let moved = (&x - &prior).amax() / prior.amax().max(f64::MIN_POSITIVE);
-    Standard {
+    StandardParameters {
         values: x.iter().copied().collect(),
         identifiability,
         is_prior: moved < ROUNDING,

@@ -6,10 +6,10 @@ use std::fmt::Write;
 use super::dissipative::{below_zero, damping_and_friction};
 use super::error::ExportError;
 use super::prepared::{
-    Drive, Prepared, drive, dynamics, hashed, inertial, joint_name, placed, quoted, root, unended,
-    words,
+    Drive, PreparedModel, drive, dynamics, hashed, inertial, joint_name, placed, quoted, root,
+    unended, words,
 };
-use super::standard::{Identifiability, Standard};
+use super::standard::{ParameterIdentifiability, StandardParameters};
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::standard::{Body, STANDARD, STANDARD_NAMES};
 use cft_ident_core::robot::tree::Link;
@@ -36,12 +36,12 @@ pub fn urdf(
     urdf_name: &str,
     notes: &[String],
 ) -> Result<UrdfFiles, ExportError> {
-    let Prepared {
+    let PreparedModel {
         file,
         model,
         standard,
         of_inertials,
-    } = &Prepared::of(file, model)?;
+    } = &PreparedModel::of(file, model)?;
     let robot = &model.robot;
     let mut out = String::from("<?xml version=\"1.0\"?>\n<!--\n");
     let below = below_zero(file, model);
@@ -179,11 +179,16 @@ fn joint(
     Ok(())
 }
 
-fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<(), ExportError> {
+fn body(
+    out: &mut String,
+    i: usize,
+    link: &Link,
+    standard: &StandardParameters,
+) -> Result<(), ExportError> {
     let range = i * STANDARD..(i + 1) * STANDARD;
     let values: [f64; STANDARD] = std::array::from_fn(|k| standard.values[range.start + k]);
     let shown = &standard.identifiability[range];
-    let of = |what: Identifiability| -> String {
+    let of = |what: ParameterIdentifiability| -> String {
         let names = STANDARD_NAMES.iter().zip(shown);
         let list: Vec<&str> = names
             .filter(|(_, t)| **t == what)
@@ -208,9 +213,9 @@ fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<
         out,
         "  <!-- about the origin of the link: determined {}; only in sums with others {}; not at all {} -->\n  \
          <link name=\"{}\">\n    {}\n  </link>\n",
-        of(Identifiability::Alone),
-        of(Identifiability::InSum),
-        of(Identifiability::Nothing),
+        of(ParameterIdentifiability::Alone),
+        of(ParameterIdentifiability::InSum),
+        of(ParameterIdentifiability::Nothing),
         quoted(&link.name),
         inertial(&Body::of(&values))
     );
@@ -224,7 +229,7 @@ pub const SIDE: &str = "# What the URDF cannot hold:";
 fn side_file(
     file: &ModelFile,
     robot: &Robot,
-    standard: &Standard,
+    standard: &StandardParameters,
     urdf_name: &str,
     notes: &[String],
 ) -> Result<String, ExportError> {

@@ -4,21 +4,21 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::arm::{Arm, ArmJoint, ArmLink, OwnJoint, Says, principal, quaternion, z_to};
+use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, OwnJoint, principal, quaternion, z_to};
 use super::prepared::hashed;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::{Rotation, UNTURNED, Vector, add, product, turn};
 
 /// What USD can say with the schemas of PhysX.
-pub const SAYS: Says = Says {
+pub const SAYS: FormatSupport = FormatSupport {
     armature: true,
     couplings: false,
 };
 
 /// Names of prims: letters, digits and underscores, each once.
-struct Prims(BTreeSet<String>);
+struct PrimNames(BTreeSet<String>);
 
-impl Prims {
+impl PrimNames {
     fn name(&mut self, name: &str) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
         let mut name: String = name.chars().map(plain).collect();
@@ -51,7 +51,7 @@ pub fn usd(arm: &Arm, notes: &[String]) -> String {
         "(\n    defaultPrim = \"identified\"\n    metersPerUnit = 1\n    kilogramsPerUnit = 1\n    upAxis = \"Z\"\n)\n\n",
     );
     out += &hashed(notes);
-    let mut prims = Prims(BTreeSet::new());
+    let mut prims = PrimNames(BTreeSet::new());
     let scene = prims.name("scene");
     let root = prims.name(&arm.root);
     let bodies: Vec<String> = arm.links.iter().map(|l| prims.name(&l.name)).collect();

@@ -15,12 +15,12 @@ const SAME_ANGLE_RAD: f64 = 1e-9;
 
 /// What was changed in a file, for one warning.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Changes {
+pub(super) struct FileChanges {
     count: usize,
     first: String,
 }
 
-impl Changes {
+impl FileChanges {
     /// Takes the angle [rad] that a text stands for; `place` says where it is.
     pub(super) fn angle(&mut self, value: f64, written: &str, place: &str) -> f64 {
         let Some(meant) = angle(written, value) else {
@@ -145,7 +145,7 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6};
 
     fn read(text: &str) -> f64 {
-        Changes::default().angle(text.parse().unwrap(), text, "rpy")
+        FileChanges::default().angle(text.parse().unwrap(), text, "rpy")
     }
 
     #[test]
@@ -199,7 +199,7 @@ mod tests {
     fn unit_vectors_at_multiples_of_15_degrees_are_exact() {
         let read = |text: [&str; 3]| {
             let value = text.map(|t| t.parse().unwrap());
-            Changes::default().axis(value, text, "axis")
+            FileChanges::default().axis(value, text, "axis")
         };
         let (root, side) = (0.5f64.sqrt(), 0.75f64.sqrt());
         for (text, exact) in [
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn one_sentence_tells_of_all_changes_and_none_where_nothing_moved() {
-        let mut changes = Changes::default();
+        let mut changes = FileChanges::default();
         let mut read = |text: &str, place| changes.angle(text.parse().unwrap(), text, place);
         read("1.57079632679", "rpy of joint a");
         assert_eq!(changes.in_words("r.urdf"), None);

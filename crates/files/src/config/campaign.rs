@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use super::document::Document;
+use super::document::TomlDocument;
 use cft_ident_logs::log::LogSpec;
 
 /// `[logs]`: log specifications by role, paths relative to the campaign file's folder.
@@ -82,7 +82,8 @@ pub struct CampaignSettings {
 /// A campaign file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Campaign {
+#[schemars(rename = "Campaign")]
+pub struct CampaignFile {
     /// Robot file, relative to the campaign file's folder, or one that comes with the tool.
     pub robot: String,
     /// Truth file of simulated logs, opened only after everything is decided.
@@ -96,10 +97,10 @@ pub struct Campaign {
     pub settings: CampaignSettings,
 }
 
-impl Campaign {
+impl CampaignFile {
     /// Reads a campaign from TOML text; `file` names it in errors.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
-        let document = Document::new(file, text);
+        let document = TomlDocument::new(file, text);
         let campaign: Self = document.read()?;
         if campaign.logs.identification.is_empty() {
             return Err(document.missing(

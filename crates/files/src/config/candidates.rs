@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use super::document::Document;
+use super::document::TomlDocument;
 use cft_ident_core::robot::FormulaSignal;
 
 /// Most effects of one file.
@@ -79,7 +79,7 @@ pub(super) struct CandidatesToml {
 /// # Errors
 /// What the file has wrong, with its line. Formulas are read where their robot is known.
 pub fn parse(file: &str, text: &str) -> Result<Vec<CandidateSection>, ConfigError> {
-    let document = Document::new(file, text);
+    let document = TomlDocument::new(file, text);
     let raw: CandidatesToml = document.read()?;
     check(&raw.candidate, &document)?;
     Ok(raw.candidate)
@@ -98,7 +98,7 @@ pub fn to_toml(candidates: &[CandidateSection]) -> Result<String, toml::ser::Err
 /// Checks what needs no robot.
 pub(super) fn check(
     candidates: &[CandidateSection],
-    document: &Document,
+    document: &TomlDocument,
 ) -> Result<(), ConfigError> {
     if candidates.len() > MAX_EFFECTS {
         let problem = format!("has {} tables", candidates.len());

@@ -5,11 +5,11 @@ use nalgebra::DMatrix;
 use super::robot_file::{ModelKind, RobotFile};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::actuation::ENCODER_SCALE;
-use cft_ident_core::robot::cft::{COORDINATES, Setup, pantograph};
+use cft_ident_core::robot::cft::{COORDINATES, LaboratorySetup, pantograph};
 use cft_ident_core::robot::tree::MOST_JOINTS;
 use cft_ident_logs::log::{
-    ActuatorChannels, Channel, ChannelChoice, ControllerTorque, Conversion, DeclaredChannels,
-    JointChannels, Layout, LogSection, PositionUnit, TorqueUnit, channel,
+    ActuatorChannels, Channel, ChannelChoice, ControllerTorque, DeclaredChannels, JointChannels,
+    Layout, LogSection, PositionUnit, RowConversion, TorqueUnit, channel,
 };
 
 impl RobotFile {
@@ -286,8 +286,8 @@ impl RobotFile {
 }
 
 /// Actuator positions to joints by eq. (57), volts to joint torques by Table 6 and eq. (66).
-fn to_joint_side(setup: Setup) -> Conversion {
-    Conversion::new(move |positions, torques, _| {
+fn to_joint_side(setup: LaboratorySetup) -> RowConversion {
+    RowConversion::new(move |positions, torques, _| {
         let Ok(x) = <[f64; 4]>::try_from(&*positions) else {
             return false;
         };
@@ -305,8 +305,8 @@ fn to_joint_side(setup: Setup) -> Conversion {
 
 /// Commands in the places of torques to the torques that a controller with these gains asked for; it cannot where
 /// velocities are wanted and the log has none.
-fn of_controller(gains: Vec<[f64; 2]>) -> Conversion {
-    Conversion::new(move |positions, torques, velocities| {
+fn of_controller(gains: Vec<[f64; 2]>) -> RowConversion {
+    RowConversion::new(move |positions, torques, velocities| {
         for (j, torque) in torques.iter_mut().enumerate() {
             let [kp, kd] = gains[j];
             let damped = match velocities.get(j) {
@@ -321,11 +321,11 @@ fn of_controller(gains: Vec<[f64; 2]>) -> Conversion {
 }
 
 /// Motor side to joint side for p = R q: q = R^-1 p + offset, tau = R' c; `None` where R has no inverse.
-fn through_gears(gears: &[Vec<f64>], offsets: Vec<f64>) -> Option<Conversion> {
+fn through_gears(gears: &[Vec<f64>], offsets: Vec<f64>) -> Option<RowConversion> {
     let n = gears.len();
     let inverse = gear_matrix(gears)?.try_inverse()?;
     let transposed = gear_matrix(gears)?.transpose();
-    Some(Conversion::new(move |positions, torques, velocities| {
+    Some(RowConversion::new(move |positions, torques, velocities| {
         if n > MOST_JOINTS || positions.len() != n {
             return false;
         }

@@ -1,11 +1,11 @@
 //! What a robot file may say: everything that no type can rule out.
 
-use super::document::Document;
+use super::document::TomlDocument;
 use super::robot_file::{FilterKind, ModelKind, RobotFile};
 use super::{ConfigError, check_limits, check_log, serial_chain};
 
 /// Checks a robot file that was read from `document`.
-pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+pub(super) fn check(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     robot(file, document)?;
     friction(file, document)?;
     check_log::check(file, document)?;
@@ -26,7 +26,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     simulator(file, document)
 }
 
-fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn robot(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     use ModelKind::{Cft, Serial, SingleJoint};
     let robot = &file.robot;
     let keys = [
@@ -77,7 +77,7 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     }
 }
 
-fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn friction(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let friction = &file.friction;
     let law = file.friction_law();
     if friction.offset && !friction.fitted_with_inertias {
@@ -119,7 +119,7 @@ fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     Ok(())
 }
 
-fn filter(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn filter(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let filter = &file.filter;
     let at = |key| ["filter", key];
     for (key, value) in [
@@ -158,7 +158,7 @@ fn filter(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     Ok(())
 }
 
-fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn limits(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     document.known_names(&["limits"], &file.limits.of, &file.coordinate_names())?;
     for (name, limits) in &file.limits.of {
         let at = |key| ["limits", name.as_str(), key];
@@ -179,7 +179,7 @@ fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     check_limits::check(file, document)
 }
 
-fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn simulator(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let control = &file.control;
     let joints = file.joint_names().len();
     per_joint(document, &["control", "kp"], &control.kp, joints)?;
@@ -230,7 +230,7 @@ fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
 
 /// Refuses a list that is neither empty nor one number for each joint or coordinate.
 fn per_joint(
-    document: &Document,
+    document: &TomlDocument,
     at: &[&str],
     values: &[f64],
     joints: usize,

@@ -1,6 +1,6 @@
 //! What `[limits]` may say of points and links.
 
-use super::document::{Document, near_and_all};
+use super::document::{TomlDocument, near_and_all};
 use super::limits::link_of;
 use super::serial_section::BASE;
 use super::{ConfigError, RobotFile};
@@ -10,7 +10,7 @@ pub(super) const MOST_CAPSULES: usize = 64;
 const MOST_POINTS: usize = 64;
 
 /// Checks what `[limits]` says of points and links.
-pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+pub(super) fn check(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let limits = &file.limits;
     if !limits.knows_places() {
         return Ok(());

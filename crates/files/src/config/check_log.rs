@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::ConfigError;
 use super::channels::gear_matrix;
-use super::document::Document;
+use super::document::TomlDocument;
 use super::robot_file::{ModelKind, RobotFile};
 use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::JointKind;
@@ -14,7 +14,7 @@ use cft_ident_logs::log::{
 };
 
 /// Checks the `[log]` section of a robot file.
-pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+pub(super) fn check(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let log = &file.log;
     document.known_names(&["log", "joint"], &log.joint, &file.joint_names())?;
     document.positive(&["log", "rate_hz"], log.rate_hz)?;
@@ -71,7 +71,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
 }
 
 /// Refuses to take the effort of a foreign recording for a joint torque: many drivers publish motor currents there.
-fn foreign_effort(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn foreign_effort(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let log = &file.log;
     let mapped = log.joint.values().any(|channels| channels.name.is_some());
     let foreign = log.torque.is_none() && (mapped || log.torque_topic.is_some());
@@ -85,7 +85,7 @@ fn foreign_effort(file: &RobotFile, document: &Document) -> Result<(), ConfigErr
 }
 
 /// `[log] torque`: gains of every joint, a column of each command, and no other torque beside.
-fn controller(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn controller(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let Some(asked) = &file.log.torque else {
         return Ok(());
     };
@@ -157,7 +157,7 @@ fn controller(file: &RobotFile, document: &Document) -> Result<(), ConfigError> 
 }
 
 /// Refuses gears that cannot be turned back, or that would be applied to what is no motor's.
-fn gears(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+fn gears(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
     let log = &file.log;
     if log.gears.is_empty() {
         return Ok(());
@@ -186,7 +186,7 @@ fn gears(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
 
 /// Refuses a column that is empty or already read as something else.
 fn claim<'c>(
-    document: &Document,
+    document: &TomlDocument,
     columns: &mut BTreeMap<&'c str, String>,
     column: &'c Option<ColumnName>,
     at: &[&str],
@@ -206,7 +206,7 @@ fn claim<'c>(
 }
 
 fn joint_channels(
-    document: &Document,
+    document: &TomlDocument,
     joint: &str,
     channels: &JointChannels,
     kind: JointKind,
@@ -278,7 +278,7 @@ fn joint_channels(
 }
 
 fn actuator_channels(
-    document: &Document,
+    document: &TomlDocument,
     name: &str,
     channels: &ActuatorChannels,
 ) -> Result<(), ConfigError> {
@@ -301,17 +301,17 @@ fn actuator_channels(
     Ok(())
 }
 
-fn range(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
+fn range(document: &TomlDocument, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
     let remedy =
         "give the range of the encoder in the unit of its column: 360, 6.283185307179586, 4096";
     document.number(at, value, |x| x > 0.0 && x.is_finite(), remedy)
 }
 
-fn sign(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
+fn sign(document: &TomlDocument, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
     document.number(at, value, |x| x.abs() == 1.0, "give 1 or -1")
 }
 
-fn scale(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
+fn scale(document: &TomlDocument, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
     let remedy = "give a finite factor other than 0";
     document.number(at, value, |x| x != 0.0 && x.is_finite(), remedy)
 }

@@ -4,14 +4,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use super::document::Document;
+use super::document::TomlDocument;
 use super::model_file::{Covariance, EffectSection, ModelFile, Parameter};
 use cft_ident_logs::log::escape;
 
 /// The parts of a model file. Values may be edited; a table that is taken out is taken out here as well.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Contents {
+#[schemars(rename = "Contents")]
+pub struct ModelContents {
     /// Keys of the parameters ([`Parameter::key`]).
     parameters: Vec<String>,
     /// Effects as `name`, `name:joint` and the keys of their parameters: `ripple:q4:cos,order,sin`.
@@ -52,7 +53,7 @@ fn effect_key(effect: &EffectSection) -> String {
     }
 }
 
-impl Contents {
+impl ModelContents {
     pub(super) fn of(model: &ModelFile) -> Self {
         let priors = model.friction_prior.iter();
         let rows = |of: &Option<Covariance>| of.as_ref().map_or(0, |c| c.names.len());
@@ -75,7 +76,7 @@ impl Contents {
         &self,
         model: &ModelFile,
         written: Vec<String>,
-        document: &Document,
+        document: &TomlDocument,
     ) -> Result<(), ConfigError> {
         let found = Self::of(model);
         let names = [
@@ -131,7 +132,7 @@ impl Contents {
     }
 }
 
-fn lost(document: &Document, list: &str, problem: &str) -> ConfigError {
+fn lost(document: &TomlDocument, list: &str, problem: &str) -> ConfigError {
     let remedy = "a part of the file was lost: copy it again whole; if the part was taken out on purpose, take it out of [contents] too";
     document.value(&["contents", list], problem, remedy)
 }

@@ -4,13 +4,13 @@ use toml::de::{DeTable, DeValue};
 
 /// A key and the value that it is to have.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Edit {
+pub struct KeyEdit {
     /// Tables from the root, then the key.
     pub path: Vec<String>,
     pub value: toml::Value,
 }
 
-impl Edit {
+impl KeyEdit {
     /// `value` for the key at `path`.
     pub fn new(path: &[&str], value: impl Into<toml::Value>) -> Self {
         Self {
@@ -35,12 +35,12 @@ impl Edit {
 }
 
 /// A text with these keys set; `None` where it is no TOML.
-pub fn edited(text: &str, edits: &[Edit]) -> Option<String> {
+pub fn edited(text: &str, edits: &[KeyEdit]) -> Option<String> {
     let mut edits = edits.iter();
     edits.try_fold(text.to_owned(), |text, edit| set(&text, edit))
 }
 
-fn set(text: &str, edit: &Edit) -> Option<String> {
+fn set(text: &str, edit: &KeyEdit) -> Option<String> {
     let root = DeTable::parse(text).ok()?;
     let (key, tables) = edit.path.split_last()?;
     let mut table = Some(root.get_ref());
@@ -109,11 +109,11 @@ position = \"c\"
     #[test]
     fn keys_are_set_where_they_are_and_comments_stay() {
         let edits = [
-            Edit::new(&["log", "joint", "q1", "torque_sign"], -1.0),
-            Edit::new(&["log", "joint", "q2", "torque_sign"], -1.0),
-            Edit::new(&["log", "joint", "q3", "torque_sign"], -1.0),
-            Edit::new(&["log", "joint", "q.4", "torque_sign"], -1.0),
-            Edit::new(&["robot", "gravity"], vec![9.81, 0.0, 0.0]),
+            KeyEdit::new(&["log", "joint", "q1", "torque_sign"], -1.0),
+            KeyEdit::new(&["log", "joint", "q2", "torque_sign"], -1.0),
+            KeyEdit::new(&["log", "joint", "q3", "torque_sign"], -1.0),
+            KeyEdit::new(&["log", "joint", "q.4", "torque_sign"], -1.0),
+            KeyEdit::new(&["robot", "gravity"], vec![9.81, 0.0, 0.0]),
         ];
         let text = edited(TEXT, &edits).unwrap();
         assert_eq!(
@@ -141,6 +141,9 @@ torque_sign = -1.0
 
     #[test]
     fn a_text_that_is_no_toml_is_left_alone() {
-        assert_eq!(edited("[robot", &[Edit::new(&["robot", "x"], 1.0)]), None);
+        assert_eq!(
+            edited("[robot", &[KeyEdit::new(&["robot", "x"], 1.0)]),
+            None
+        );
     }
 }

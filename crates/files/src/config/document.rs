@@ -12,12 +12,12 @@ use cft_ident_core::number;
 use cft_ident_logs::log::{escape, escape_whole, list, nearest};
 
 /// A TOML text and the name under which errors speak of it.
-pub(crate) struct Document<'a> {
+pub(crate) struct TomlDocument<'a> {
     file: &'a str,
     text: &'a str,
 }
 
-impl<'a> Document<'a> {
+impl<'a> TomlDocument<'a> {
     pub(crate) fn new(file: &'a str, text: &'a str) -> Self {
         Self { file, text }
     }

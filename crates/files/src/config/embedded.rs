@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::campaign::Campaign;
-use super::document::Document;
+use super::campaign::CampaignFile;
+use super::document::TomlDocument;
 use super::model_file::ModelFile;
 use super::robot_file::RobotFile;
 use super::text_file::text_of;
@@ -47,7 +47,7 @@ pub fn embedded(path: &Path) -> Option<&'static str> {
 
 /// What a file is to be, which decides what is suggested where it is not there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wanted {
+pub enum WantedFile {
     Robot,
     Trajectory,
     /// A file of the user's: a model, a campaign, a document.
@@ -56,25 +56,27 @@ pub enum Wanted {
     Any,
 }
 
-impl Wanted {
+impl WantedFile {
     /// Whether a file of the user's may be one: a robot file is no model, and neither is a trajectory.
     fn may_be(self, path: &Path) -> bool {
         let Ok(text) = text_of(path) else {
             return false;
         };
         match self {
-            Wanted::Robot | Wanted::Trajectory => self.is(&text) && !text.contains("[contents]"),
-            Wanted::Own | Wanted::Any => true,
+            WantedFile::Robot | WantedFile::Trajectory => {
+                self.is(&text) && !text.contains("[contents]")
+            }
+            WantedFile::Own | WantedFile::Any => true,
         }
     }
 
     /// Whether a file that comes with the tool is one.
     fn is(self, text: &str) -> bool {
         match self {
-            Wanted::Robot => text.contains("[robot]"),
-            Wanted::Trajectory => text.contains("kind = ") && !text.contains("[robot]"),
-            Wanted::Own => false,
-            Wanted::Any => true,
+            WantedFile::Robot => text.contains("[robot]"),
+            WantedFile::Trajectory => text.contains("kind = ") && !text.contains("[robot]"),
+            WantedFile::Own => false,
+            WantedFile::Any => true,
         }
     }
 }
@@ -84,14 +86,14 @@ impl Wanted {
 /// # Errors
 /// [`ConfigError::Read`] where there is neither.
 pub fn text(path: &Path) -> Result<String, ConfigError> {
-    text_of_kind(path, Wanted::Any)
+    text_of_kind(path, WantedFile::Any)
 }
 
 /// Text of a file of one kind, likewise.
 ///
 /// # Errors
 /// [`ConfigError::Read`] where there is neither.
-pub fn text_of_kind(path: &Path, wanted: Wanted) -> Result<String, ConfigError> {
+pub fn text_of_kind(path: &Path, wanted: WantedFile) -> Result<String, ConfigError> {
     let error = match text_of(path) {
         Ok(text) => return Ok(text),
         Err(error) => error,
@@ -170,7 +172,7 @@ impl RobotFile {
         if let Some(kind) = other_kind(Path::new(file), text) {
             return Err(kind);
         }
-        let document = Document::new(file, text);
+        let document = TomlDocument::new(file, text);
         let mut robot: Self = document.read()?;
         let taken = serial_chain::take_as_meant(&mut robot.robot, &document, file);
         robot.notes.0.extend(taken);
@@ -182,7 +184,7 @@ impl RobotFile {
 
     /// Reads and checks a robot file, or one that comes with the tool.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let text = text_of_kind(path, Wanted::Robot)?;
+        let text = text_of_kind(path, WantedFile::Robot)?;
         Self::parse_in(&shown(path), &text, path.parent())
     }
 }
@@ -190,7 +192,7 @@ impl RobotFile {
 impl ModelFile {
     /// Reads and checks a model file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let text = text_of_kind(path, Wanted::Own)?;
+        let text = text_of_kind(path, WantedFile::Own)?;
         Self::parse_in(&shown(path), &text, path.parent())
     }
 }
@@ -198,14 +200,14 @@ impl ModelFile {
 impl Trajectory {
     /// Reads and checks a trajectory file, or one that comes with the tool.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse(&shown(path), &text_of_kind(path, Wanted::Trajectory)?)
+        Self::parse(&shown(path), &text_of_kind(path, WantedFile::Trajectory)?)
     }
 }
 
-impl Campaign {
+impl CampaignFile {
     /// Reads and checks a campaign file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse(&shown(path), &text_of_kind(path, Wanted::Own)?)
+        Self::parse(&shown(path), &text_of_kind(path, WantedFile::Own)?)
     }
 }
 
@@ -220,13 +222,13 @@ mod tests {
                 .unwrap_err()
                 .to_string()
         };
-        let robot = said(Wanted::Robot);
+        let robot = said(WantedFile::Robot);
         assert!(robot.contains("configs/ur10.toml"), "{robot}");
         assert!(!robot.contains("configs/cft-excitation.toml"), "{robot}");
-        let motion = said(Wanted::Trajectory);
+        let motion = said(WantedFile::Trajectory);
         assert!(motion.contains("configs/cft-excitation.toml"), "{motion}");
         assert!(!motion.contains("configs/ur10.toml"), "{motion}");
-        assert!(!said(Wanted::Own).contains("come with the tool"));
+        assert!(!said(WantedFile::Own).contains("come with the tool"));
 
         let folder = tempfile::tempdir().unwrap();
         let write =
@@ -234,7 +236,7 @@ mod tests {
         write("arm_model.toml", "[contents]\n[robot]\n");
         write("arm_robot.toml", "[robot]\n");
         let missing = folder.path().join("arm_mobel.toml");
-        let said = text_of_kind(&missing, Wanted::Robot).unwrap_err();
+        let said = text_of_kind(&missing, WantedFile::Robot).unwrap_err();
         let said = said.to_string();
         assert!(
             said.contains("arm_robot.toml") && !said.contains("arm_model.toml"),

@@ -118,7 +118,8 @@ impl HeldOut {
 /// The level and the excesses are of the greatest over joints of |external| / (`external_std` `external_99`).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Excesses {
+#[schemars(rename = "Excesses")]
+pub struct TorqueExcesses {
     /// Time that was observed \[s\].
     pub observed_s: f64,
     /// Cut-off of the filter of positions and torques \[Hz\].
@@ -137,7 +138,7 @@ pub struct Excesses {
 /// Clusters from which on a threshold is one of them.
 const COUNTED: f64 = 5.0;
 
-impl Excesses {
+impl TorqueExcesses {
     /// The threshold that is crossed so often an hour.
     pub fn threshold(&self, per_hour: f64) -> f64 {
         let rate = self.clusters as f64 / self.observed_s * 3600.0;
@@ -190,7 +191,7 @@ mod tests {
 
     #[test]
     fn thresholds_rise_as_alarms_become_rarer() {
-        let mut law = Excesses {
+        let mut law = TorqueExcesses {
             observed_s: 1800.0,
             position_cutoff_hz: 60.0,
             level: 0.9,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::ConfigError;
 use super::campaign::EstimatorKind;
 use super::candidates::CandidateSection;
-use super::held_out::{Excesses, HeldOut};
+use super::held_out::{HeldOut, TorqueExcesses};
 use super::limits::Limits;
 use super::robot_file::{ModelKind, RobotFile};
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -251,7 +251,7 @@ pub struct ModelFile {
     /// What was left of torques that were set aside, of every joint in their order; empty where nothing was.
     pub held_out: Vec<HeldOut>,
     /// How often external torques that are none go beyond a level.
-    pub excesses: Option<Excesses>,
+    pub excesses: Option<TorqueExcesses>,
     /// Formulas of those effects that are the user's own.
     pub candidates: Vec<CandidateSection>,
     pub effects: Vec<EffectSection>,

@@ -8,10 +8,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::candidates::{self, CandidateSection};
-use super::contents::{self, Contents};
-use super::document::Document;
+use super::contents::{self, ModelContents};
+use super::document::TomlDocument;
 use super::embedded::other_kind;
-use super::held_out::{Excesses, HeldOut};
+use super::held_out::{HeldOut, TorqueExcesses};
 use super::limits::Limits;
 use super::model_file::{
     Covariance, EffectSection, Estimate, FrictionPrior, LinkBody, ModelFile, ModelProvenance,
@@ -21,7 +21,7 @@ use super::robot_file::{
     ControlSection, FilterSection, FrictionSection, NoiseSection, RobotFile, RobotSection,
     SensorsSection,
 };
-use super::robot_file::{ModelKind, Notes};
+use super::robot_file::{ModelKind, ReadingNotes};
 use super::{ConfigError, check, urdf};
 use cft_ident_core::robot::drive::JointDrive;
 use cft_ident_logs::log::{LogSection, escape};
@@ -30,7 +30,7 @@ use cft_ident_logs::log::{LogSection, escape};
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ModelToml {
-    contents: Option<Contents>,
+    contents: Option<ModelContents>,
     robot: RobotSection,
     #[serde(default)]
     friction: FrictionSection,
@@ -57,7 +57,7 @@ pub(super) struct ModelToml {
     friction_prior: Vec<FrictionPrior>,
     #[serde(default)]
     held_out: Vec<HeldOut>,
-    excesses: Option<Excesses>,
+    excesses: Option<TorqueExcesses>,
     #[serde(default)]
     candidate: Vec<CandidateSection>,
     #[serde(default)]
@@ -129,7 +129,7 @@ impl ModelFile {
         if let Some(kind) = other_kind(Path::new(file), text) {
             return Err(kind);
         }
-        let document = Document::new(file, text);
+        let document = TomlDocument::new(file, text);
         let mut raw: ModelToml = document.read()?;
         if raw.parameter.is_empty() && raw.provenance.is_none() {
             return Err(ConfigError::Kind {
@@ -156,7 +156,7 @@ impl ModelFile {
             drive: raw.drive,
             control: raw.control,
             sensors: raw.sensors,
-            notes: Notes::default(),
+            notes: ReadingNotes::default(),
         };
         let beside = robot.robot.urdf.is_some();
         let written: Vec<String> = raw.parameter.iter().map(Parameter::key).collect();
@@ -226,7 +226,7 @@ impl ModelFile {
         put(
             &mut text,
             "# What this file must hold, so that a part that is lost is noticed. Values may be edited.\n",
-            toml::to_string_pretty(&BTreeMap::from([("contents", Contents::of(self))])),
+            toml::to_string_pretty(&BTreeMap::from([("contents", ModelContents::of(self))])),
         )?;
         put(&mut text, "\n", toml::to_string(&self.robot))?;
         text.push_str("\n# Parameters: value and standard deviation of the fit in `unit`, theta as in the report's Table 4. Torques are computed\n# with `consistent` where it stands: the nearest numbers of links, drives and friction that can exist.\n");
@@ -310,7 +310,7 @@ impl ModelFile {
         Ok(text)
     }
 
-    fn check_parameters(&self, document: &Document) -> Result<(), ConfigError> {
+    fn check_parameters(&self, document: &TomlDocument) -> Result<(), ConfigError> {
         let joints = self.robot.joint_names();
         let mut seen = BTreeSet::new();
         for (index, parameter) in self.parameters.iter().enumerate() {
@@ -332,7 +332,7 @@ impl ModelFile {
         &self,
         table: &str,
         covariance: Option<&Covariance>,
-        document: &Document,
+        document: &TomlDocument,
     ) -> Result<(), ConfigError> {
         let Some(covariance) = covariance else {
             return Ok(());
@@ -357,7 +357,7 @@ impl ModelFile {
         Ok(())
     }
 
-    fn check_held_out(&self, document: &Document) -> Result<(), ConfigError> {
+    fn check_held_out(&self, document: &TomlDocument) -> Result<(), ConfigError> {
         let joints = self.robot.joint_names();
         let refit = "fit the model again; what stands here is no number to choose";
         let mut there = self.held_out.iter().map(|held| &held.joint);
@@ -382,7 +382,7 @@ impl ModelFile {
         }
     }
 
-    fn check_rest(&self, document: &Document) -> Result<(), ConfigError> {
+    fn check_rest(&self, document: &TomlDocument) -> Result<(), ConfigError> {
         let joints = self.robot.joint_names();
         for (joint, std) in &self.residual_std {
             document.known_joint(&["residual_std", joint], joint, &joints)?;

@@ -9,7 +9,7 @@ use super::document::is_default;
 pub use super::limits::CoordinateLimits;
 use super::limits::Limits;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
-use cft_ident_core::robot::cft::{self, Setup, Structure};
+use cft_ident_core::robot::cft::{self, LaboratorySetup, ParameterStructure};
 use cft_ident_core::robot::drive::JointDrive;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::{JointKind, Robot};
@@ -46,7 +46,7 @@ pub struct RobotSection {
     pub model: ModelKind,
     /// Set-up of the CFT robot.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub setup: Option<Setup>,
+    pub setup: Option<LaboratorySetup>,
     /// Inertial parameters of the CFT robot: 12 (the report) or 22 (the full chain).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameters: Option<u32>,
@@ -327,15 +327,15 @@ pub struct RobotFile {
     pub sensors: SensorsSection,
     /// What was taken otherwise than it is written, one sentence each; commands tell it as warnings.
     #[serde(skip)]
-    pub notes: Notes,
+    pub notes: ReadingNotes,
 }
 
 /// Sentences about the reading of a file. They are no part of what it says: two files that say the same
 /// are equal, whatever was noted of them.
 #[derive(Debug, Clone, Default)]
-pub struct Notes(pub Vec<String>);
+pub struct ReadingNotes(pub Vec<String>);
 
-impl PartialEq for Notes {
+impl PartialEq for ReadingNotes {
     fn eq(&self, _: &Self) -> bool {
         true
     }
@@ -348,8 +348,8 @@ impl RobotFile {
             ModelKind::Cft => Robot::cft(
                 self.robot.setup.unwrap_or_default(),
                 match self.robot.parameters {
-                    Some(22) => Structure::Full22,
-                    _ => Structure::Printed12,
+                    Some(22) => ParameterStructure::Full22,
+                    _ => ParameterStructure::Printed12,
                 },
             ),
             ModelKind::Serial if self.friction.motors == Some(true) => {

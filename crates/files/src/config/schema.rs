@@ -3,7 +3,7 @@
 use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 
-use super::{Campaign, RobotFile, model_text, trajectory};
+use super::{CampaignFile, RobotFile, model_text, trajectory};
 
 fn of<T: JsonSchema>() -> Value {
     Value::from(schema_for!(T))
@@ -21,7 +21,7 @@ pub fn model() -> Value {
 
 /// Of a campaign file.
 pub fn campaign() -> Value {
-    of::<Campaign>()
+    of::<CampaignFile>()
 }
 
 /// Of a trajectory file.

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ConfigError;
-use super::angles::Changes;
-use super::document::{Document, near_and_all};
+use super::angles::FileChanges;
+use super::document::{TomlDocument, near_and_all};
 use super::robot_file::RobotSection;
 use super::serial_section::{
     BASE, CouplingSection, FollowsSection, LinkSection, MOST_LINKS, SineSection,
@@ -12,7 +12,7 @@ use super::serial_section::{
 use cft_ident_core::explain::Explain;
 use cft_ident_core::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
 use cft_ident_core::robot::tree::{
-    Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError,
+    Coordinate, DependentCoordinate, JointCoupling, Link, SineTerm, Tree, TreeError,
 };
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_logs::log::{escape, list, nearest};
@@ -49,27 +49,27 @@ impl RobotSection {
     }
 
     /// The serial robot that the section describes.
-    pub(super) fn serial(&self) -> Result<Robot, Misfit> {
-        let names = Names {
+    pub(super) fn serial(&self) -> Result<Robot, ChainMisfit> {
+        let names = SectionNames {
             links: self.link_names(),
             joints: self.chain_joints(),
         };
         let links = (0..self.link.len()).map(|i| self.placed_link(i, &names));
-        let links = links.collect::<Result<Vec<Link>, Misfit>>()?;
+        let links = links.collect::<Result<Vec<Link>, ChainMisfit>>()?;
         let couplings = self.coupling.iter().map(|c| names.coupling(c));
-        let couplings = couplings.collect::<Result<Vec<Coupling>, Misfit>>()?;
+        let couplings = couplings.collect::<Result<Vec<JointCoupling>, ChainMisfit>>()?;
         let joints = names.joints;
         let tree = Tree::new(links, joints.len(), self.gravity.unwrap_or(GRAVITY))
-            .map_err(|error| Misfit::of_tree(&error))?;
+            .map_err(|error| ChainMisfit::of_tree(&error))?;
         let drive_inertia = self.drive_inertia.unwrap_or(true);
         Ok(Robot::of_tree(tree, joints, drive_inertia, couplings))
     }
 
     /// Link `i` on its parent, with what moves it.
-    fn placed_link(&self, i: usize, names: &Names) -> Result<Link, Misfit> {
+    fn placed_link(&self, i: usize, names: &SectionNames) -> Result<Link, ChainMisfit> {
         let section = &self.link[i];
         if names.links[..i].contains(&names.links[i]) {
-            return Err(Misfit::of_link(
+            return Err(ChainMisfit::of_link(
                 i,
                 "name",
                 "is the name of another link too",
@@ -85,13 +85,13 @@ impl RobotSection {
                         "let this link follow it: `follows = {{ linear = {{ {joint} = 1.0 }} }}`"
                     );
                     let problem = "moves another link too";
-                    return Err(Misfit::of_link(i, "joint", problem, &remedy));
+                    return Err(ChainMisfit::of_link(i, "joint", problem, &remedy));
                 }
                 Coordinate::Joint(names.joint(joint).unwrap_or_default())
             }
             (None, Some(follows)) => Coordinate::Follows(names.dependence(i, follows)?),
             _ => {
-                return Err(Misfit::of_link(
+                return Err(ChainMisfit::of_link(
                     i,
                     "joint",
                     "must stand in the link, or `follows`, and not both",
@@ -118,14 +118,14 @@ impl RobotSection {
 }
 
 /// Rotation and origin of a link in its parent's frame, and its axis of length 1.
-fn placement(i: usize, section: &LinkSection) -> Result<((Rotation, Vector), Vector), Misfit> {
+fn placement(i: usize, section: &LinkSection) -> Result<((Rotation, Vector), Vector), ChainMisfit> {
     let row = [section.a, section.alpha, section.d, section.theta];
     if section.xyz.is_none() && section.rpy.is_none() && section.axis.is_none() {
         let [a, alpha, d, theta] = row.map(Option::unwrap_or_default);
         return Ok((Link::of_row(a, alpha, d, theta), [0.0, 0.0, 1.0]));
     }
     if row.iter().any(Option::is_some) {
-        return Err(Misfit::of_link(
+        return Err(ChainMisfit::of_link(
             i,
             "xyz",
             "stands beside a Denavit-Hartenberg row",
@@ -136,7 +136,7 @@ fn placement(i: usize, section: &LinkSection) -> Result<((Rotation, Vector), Vec
     let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
     if !(length.is_finite() && length > 1e-6) {
         let remedy = "give three numbers that are not all 0";
-        return Err(Misfit::of_link(i, "axis", "has no length", remedy));
+        return Err(ChainMisfit::of_link(i, "axis", "has no length", remedy));
     }
     let rotation = of_roll_pitch_yaw(&section.rpy.unwrap_or_default());
     let origin = section.xyz.unwrap_or_default();
@@ -144,13 +144,13 @@ fn placement(i: usize, section: &LinkSection) -> Result<((Rotation, Vector), Vec
 }
 
 /// Names that a section gives and refers to.
-struct Names {
+struct SectionNames {
     links: Vec<String>,
     /// The independent ones.
     joints: Vec<String>,
 }
 
-impl Names {
+impl SectionNames {
     fn joint(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|joint| joint == name)
     }
@@ -162,12 +162,12 @@ impl Names {
     }
 
     /// The link that link `i` hangs on; `None` for the base.
-    fn parent(&self, i: usize, section: &LinkSection) -> Result<Option<usize>, Misfit> {
+    fn parent(&self, i: usize, section: &LinkSection) -> Result<Option<usize>, ChainMisfit> {
         match section.parent.as_deref() {
             None => Ok(i.checked_sub(1)),
             Some(BASE) => Ok(None),
             Some(parent) => match self.links[..i].iter().position(|n| n == parent) {
-                None => Err(Misfit::of_link(
+                None => Err(ChainMisfit::of_link(
                     i,
                     "parent",
                     "is no link before this one",
@@ -183,11 +183,11 @@ impl Names {
         &self,
         i: usize,
         follows: &FollowsSection,
-    ) -> Result<DependentCoordinate, Misfit> {
-        let terms = |of: &BTreeMap<String, f64>| -> Result<Vec<(usize, f64)>, Misfit> {
+    ) -> Result<DependentCoordinate, ChainMisfit> {
+        let terms = |of: &BTreeMap<String, f64>| -> Result<Vec<(usize, f64)>, ChainMisfit> {
             let term = |(joint, c): (&String, &f64)| match self.joint(joint) {
                 Some(index) => Ok((index, *c)),
-                None => Err(Misfit::of_link(
+                None => Err(ChainMisfit::of_link(
                     i,
                     "follows",
                     "names no independent joint",
@@ -196,8 +196,8 @@ impl Names {
             };
             of.iter().map(term).collect()
         };
-        let sine = |s: &SineSection| -> Result<Sine, Misfit> {
-            Ok(Sine {
+        let sine = |s: &SineSection| -> Result<SineTerm, ChainMisfit> {
+            Ok(SineTerm {
                 amplitude: s.amplitude,
                 phase: s.phase,
                 of: terms(&s.of)?,
@@ -210,22 +210,22 @@ impl Names {
         })
     }
 
-    fn coupling(&self, c: &CouplingSection) -> Result<Coupling, Misfit> {
+    fn coupling(&self, c: &CouplingSection) -> Result<JointCoupling, ChainMisfit> {
         let joint = |name: &str| {
             self.joint(name).ok_or_else(|| {
-                Misfit::of_robot(
+                ChainMisfit::of_robot(
                     &format!("couples `{name}`, which is no independent joint"),
                     &self.instead_of(name),
                 )
             })
         };
-        let coupling = Coupling {
+        let coupling = JointCoupling {
             motor: joint(&c.motor)?,
             other: joint(&c.other)?,
             ratio: c.ratio,
         };
         if coupling.motor == coupling.other || !c.ratio.is_finite() || c.ratio == 0.0 {
-            return Err(Misfit::of_robot(
+            return Err(ChainMisfit::of_robot(
                 "has a coupling of a joint with itself, or of ratio 0",
                 "couple two joints with a ratio that is not 0",
             ));
@@ -236,7 +236,7 @@ impl Names {
 
 /// What keeps a section from being a chain.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Misfit {
+pub(super) struct ChainMisfit {
     /// Which link, from 0; `None` for the robot as a whole.
     link: Option<usize>,
     key: &'static str,
@@ -244,7 +244,7 @@ pub(super) struct Misfit {
     remedy: String,
 }
 
-impl Misfit {
+impl ChainMisfit {
     fn of_robot(problem: &str, remedy: &str) -> Self {
         Self {
             link: None,
@@ -275,14 +275,14 @@ impl Misfit {
 /// Takes angles and axes for what they stand for, unless the file says otherwise; what was changed, in a sentence.
 pub(super) fn take_as_meant(
     section: &mut RobotSection,
-    document: &Document,
+    document: &TomlDocument,
     file: &str,
 ) -> Option<String> {
     // more links than a file may have are refused by the check
     if section.angles_as_written == Some(true) || section.link.len() > MOST_LINKS {
         return None;
     }
-    let mut changes = Changes::default();
+    let mut changes = FileChanges::default();
     for (i, link) in section.link.iter_mut().enumerate() {
         let index = i.to_string();
         let name = link.joint.as_ref().or(link.name.as_ref());
@@ -308,7 +308,7 @@ pub(super) fn take_as_meant(
 }
 
 /// Refuses rows that `new` wrote and nobody filled in.
-fn filled_in(section: &RobotSection, document: &Document) -> Result<(), ConfigError> {
+fn filled_in(section: &RobotSection, document: &TomlDocument) -> Result<(), ConfigError> {
     for (i, link) in section.link.iter().enumerate() {
         let row = [link.a, link.alpha, link.d, link.theta];
         for (key, value) in ["a", "alpha", "d", "theta"].into_iter().zip(row) {
@@ -343,7 +343,7 @@ fn filled_in(section: &RobotSection, document: &Document) -> Result<(), ConfigEr
 }
 
 /// Refuses a serial section that is no chain.
-pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), ConfigError> {
+pub(super) fn check(section: &RobotSection, document: &TomlDocument) -> Result<(), ConfigError> {
     if section.link.is_empty() {
         return Err(document.missing(
             &["robot", "link"],
@@ -374,7 +374,7 @@ pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), C
 }
 
 /// Refuses frames that hang on nothing or share a name.
-fn frames(section: &RobotSection, document: &Document) -> Result<(), ConfigError> {
+fn frames(section: &RobotSection, document: &TomlDocument) -> Result<(), ConfigError> {
     let links = section.link_names();
     let mut taken: BTreeSet<&str> = links.iter().map(String::as_str).collect();
     taken.insert(BASE);

@@ -6,13 +6,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use super::document::Document;
+use super::document::TomlDocument;
 use cft_ident_logs::log::is_hidden;
 
 /// In which coordinates a trajectory is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Coordinates {
+#[schemars(rename = "Coordinates")]
+pub enum TrajectoryCoordinates {
     /// Actuator coordinates x_c1..x_c4 of the CFT robot [m, m, rad, m].
     Cartesian,
     /// Joint coordinates of the robot [m or rad].
@@ -40,7 +41,7 @@ pub struct FourierCoordinate {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FourierSection {
     /// Which coordinates the series is in.
-    pub coordinates: Coordinates,
+    pub coordinates: TrajectoryCoordinates,
     /// Fundamental frequency [Hz]; omega_f = 2 pi times it.
     pub fundamental_hz: f64,
     /// Where in its period the motion begins [s]; 0 where absent.
@@ -84,7 +85,7 @@ pub struct Point {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointsSection {
     /// Which coordinates the poses are in.
-    pub coordinates: Coordinates,
+    pub coordinates: TrajectoryCoordinates,
     /// The poses, at least two.
     #[serde(rename = "point")]
     pub points: Vec<Point>,
@@ -104,7 +105,8 @@ pub(crate) const CARTESIAN: [&str; 4] = ["x_c1", "x_c2", "x_c3", "x_c4"];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-enum Kind {
+#[schemars(rename = "Kind")]
+enum TrajectoryKind {
     Fourier,
     SingleJoint,
     Points,
@@ -114,8 +116,8 @@ enum Kind {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TrajectoryToml {
-    kind: Kind,
-    coordinates: Option<Coordinates>,
+    kind: TrajectoryKind,
+    coordinates: Option<TrajectoryCoordinates>,
     fundamental_hz: Option<f64>,
     start_s: Option<f64>,
     blend_s: Option<f64>,
@@ -135,13 +137,13 @@ pub(super) struct TrajectoryToml {
 impl Trajectory {
     /// Reads a trajectory from TOML text; `file` names it in errors.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
-        let document = Document::new(file, text);
+        let document = TomlDocument::new(file, text);
         let raw: TrajectoryToml = document.read()?;
         foreign_keys(&document, &raw)?;
         match raw.kind {
-            Kind::Fourier => fourier(&document, raw).map(Self::Fourier),
-            Kind::SingleJoint => single_joint(&document, raw).map(Self::SingleJoint),
-            Kind::Points => points(&document, raw).map(Self::Points),
+            TrajectoryKind::Fourier => fourier(&document, raw).map(Self::Fourier),
+            TrajectoryKind::SingleJoint => single_joint(&document, raw).map(Self::SingleJoint),
+            TrajectoryKind::Points => points(&document, raw).map(Self::Points),
         }
     }
 
@@ -165,9 +167,9 @@ fn printable(line: &str) -> String {
 }
 
 /// Refuses a key of another kind of trajectory, which would silently do nothing.
-fn foreign_keys(document: &Document, raw: &TrajectoryToml) -> Result<(), ConfigError> {
-    use Kind::{Fourier, Points, SingleJoint};
-    let keys: [(&str, bool, &[Kind]); 12] = [
+fn foreign_keys(document: &TomlDocument, raw: &TrajectoryToml) -> Result<(), ConfigError> {
+    use TrajectoryKind::{Fourier, Points, SingleJoint};
+    let keys: [(&str, bool, &[TrajectoryKind]); 12] = [
         ("coordinates", raw.coordinates.is_some(), &[Fourier, Points]),
         ("fundamental_hz", raw.fundamental_hz.is_some(), &[Fourier]),
         ("start_s", raw.start_s.is_some(), &[Fourier]),
@@ -181,7 +183,8 @@ fn foreign_keys(document: &Document, raw: &TrajectoryToml) -> Result<(), ConfigE
         ("turn_s", raw.turn_s.is_some(), &[SingleJoint]),
         ("point", !raw.point.is_empty(), &[Points]),
     ];
-    let foreign = |(_, given, kinds): &&(&str, bool, &[Kind])| *given && !kinds.contains(&raw.kind);
+    let foreign =
+        |(_, given, kinds): &&(&str, bool, &[TrajectoryKind])| *given && !kinds.contains(&raw.kind);
     let Some((key, ..)) = keys.iter().find(foreign) else {
         return Ok(());
     };
@@ -189,7 +192,10 @@ fn foreign_keys(document: &Document, raw: &TrajectoryToml) -> Result<(), ConfigE
     Err(document.value(&[key], problem, "delete it, or choose the right `kind`"))
 }
 
-fn coordinates(document: &Document, raw: &TrajectoryToml) -> Result<Coordinates, ConfigError> {
+fn coordinates(
+    document: &TomlDocument,
+    raw: &TrajectoryToml,
+) -> Result<TrajectoryCoordinates, ConfigError> {
     raw.coordinates.ok_or_else(|| {
         document.missing(
             &["coordinates"],
@@ -198,7 +204,7 @@ fn coordinates(document: &Document, raw: &TrajectoryToml) -> Result<Coordinates,
     })
 }
 
-fn fourier(document: &Document, raw: TrajectoryToml) -> Result<FourierSection, ConfigError> {
+fn fourier(document: &TomlDocument, raw: TrajectoryToml) -> Result<FourierSection, ConfigError> {
     let coordinates = coordinates(document, &raw)?;
     let Some(fundamental_hz) = raw.fundamental_hz else {
         return Err(document.missing(&["fundamental_hz"], "the fundamental frequency in Hz"));
@@ -216,7 +222,9 @@ fn fourier(document: &Document, raw: TrajectoryToml) -> Result<FourierSection, C
         if others.nth(1).is_some() {
             return Err(document.value(&at, "is named twice", "give each coordinate one table"));
         }
-        if coordinates == Coordinates::Cartesian && !CARTESIAN.contains(&coordinate.name.as_str()) {
+        if coordinates == TrajectoryCoordinates::Cartesian
+            && !CARTESIAN.contains(&coordinate.name.as_str())
+        {
             return Err(document.value(
                 &at,
                 "is no actuator coordinate",
@@ -241,7 +249,10 @@ fn fourier(document: &Document, raw: TrajectoryToml) -> Result<FourierSection, C
     })
 }
 
-fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointMove, ConfigError> {
+fn single_joint(
+    document: &TomlDocument,
+    raw: TrajectoryToml,
+) -> Result<SingleJointMove, ConfigError> {
     let joint = raw
         .joint
         .ok_or_else(|| document.missing(&["joint"], "the joint that moves"))?;
@@ -268,7 +279,7 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
     })
 }
 
-fn points(document: &Document, raw: TrajectoryToml) -> Result<PointsSection, ConfigError> {
+fn points(document: &TomlDocument, raw: TrajectoryToml) -> Result<PointsSection, ConfigError> {
     let coordinates = coordinates(document, &raw)?;
     if raw.point.len() < 2 {
         let remedy = "at least two `[[point]]` tables with `t` and `position`";
@@ -305,7 +316,7 @@ mod tests {
     fn every_kind_reads_back_as_it_was() {
         let all = [
             Trajectory::Fourier(FourierSection {
-                coordinates: Coordinates::Cartesian,
+                coordinates: TrajectoryCoordinates::Cartesian,
                 fundamental_hz: 0.4,
                 start_s: Some(0.1 + 0.2),
                 blend_s: Some(2.0),
@@ -325,7 +336,7 @@ mod tests {
                 turn_s: Some(0.7),
             }),
             Trajectory::Points(PointsSection {
-                coordinates: Coordinates::Joint,
+                coordinates: TrajectoryCoordinates::Joint,
                 points: (0..3)
                     .map(|k| Point {
                         t: f64::from(k),

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use cft_ident_core::robot::cft::Setup;
+use cft_ident_core::robot::cft::LaboratorySetup;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::robot_file::{FilterKind, FrictionLawKind};
-use cft_ident_files::config::trajectory::{Coordinates, Trajectory};
-use cft_ident_files::config::{Campaign, ConfigError, EMBEDDED, RobotFile, embedded, text};
+use cft_ident_files::config::trajectory::{Trajectory, TrajectoryCoordinates};
+use cft_ident_files::config::{CampaignFile, ConfigError, EMBEDDED, RobotFile, embedded, text};
 use proptest::prelude::*;
 
 const SINGLE: &str = "[robot]\nmodel = \"single-joint\"\njoint = \"q1\"\nkind = \"prismatic\"\n";
@@ -37,7 +37,7 @@ fn every_file_that_comes_with_the_tool_is_valid_and_found_from_anywhere() {
         }
     }
     let dspace = RobotFile::load(Path::new("configs/cft-dspace.toml")).unwrap();
-    assert_eq!(dspace.robot.setup, Some(Setup::Dspace));
+    assert_eq!(dspace.robot.setup, Some(LaboratorySetup::Dspace));
     assert_eq!(dspace.joint_names(), ["q1", "q2", "q4", "q5"]);
     assert_eq!(dspace.friction_law(), FrictionLawKind::DoubleTanh);
 }
@@ -82,7 +82,7 @@ fn table_3_is_the_reports() {
     };
     assert_eq!(
         (table.coordinates, table.fundamental_hz),
-        (Coordinates::Cartesian, 0.4)
+        (TrajectoryCoordinates::Cartesian, 0.4)
     );
     let names: Vec<&str> = table.series.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["x_c1", "x_c2", "x_c3", "x_c4"]);
@@ -208,7 +208,7 @@ fn files_that_cannot_be_are_refused_with_the_line_and_the_way_out() {
             "cft" => robot(CFT),
             "fourier" => motion(FOURIER),
             "motion" => motion(""),
-            "campaign" => Campaign::parse("c.toml", &rest).map(drop),
+            "campaign" => CampaignFile::parse("c.toml", &rest).map(drop),
             _ => robot(""),
         };
         refused(result, words);
@@ -236,7 +236,7 @@ fn trajectories_are_read_in_three_kinds() {
 #[test]
 fn campaigns_name_robot_logs_and_settings() {
     let campaign = "robot = \"configs/cft.toml\"\n[logs]\nfriction = [\"a.csv\"]\nidentification = [\"b.csv@0..70%\"]\n[settings]\nestimator = \"ols\"\n";
-    let campaign = Campaign::parse("c.toml", campaign).unwrap();
+    let campaign = CampaignFile::parse("c.toml", campaign).unwrap();
     assert_eq!(campaign.settings.estimator, EstimatorKind::Ols);
     assert_eq!(campaign.logs.identification, ["b.csv@0..70%"]);
 }
@@ -255,7 +255,7 @@ proptest! {
         let _ = RobotFile::parse("r", &text);
         let _ = RobotFile::parse("r", &format!("{CFT}{text}"));
         let _ = Trajectory::parse("t", &text);
-        let _ = Campaign::parse("c", &text);
+        let _ = CampaignFile::parse("c", &text);
         let _ = cft_ident_files::config::ModelFile::parse("m", &format!("{SINGLE}{text}"));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cft_ident_files::config::held_out::{Excesses, HeldOut};
+use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 use cft_ident_files::config::model_file::{
     Covariance, EffectParameter, EffectSection, FrictionPrior, ModelFile, ModelProvenance,
     Parameter, Verdict,
@@ -101,7 +101,7 @@ fn model(values: &[f64]) -> ModelFile {
                 external_99: 2.75,
             })
             .collect(),
-        excesses: Some(Excesses {
+        excesses: Some(TorqueExcesses {
             observed_s: 60.0,
             position_cutoff_hz: 80.0,
             level: 0.875,

@@ -6,8 +6,8 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::local_level::smooth;
-use super::together::{About, White, orthonormal, without};
-use super::walk::{Sizes, TRIED, median, sizes};
+use super::together::{CourseSignals, CourseWhitener, orthonormal, without};
+use super::walk::{TRIED, WalkSizes, median, sizes};
 
 /// How a parameter changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -36,7 +36,7 @@ pub struct ParameterChange {
 
 /// A change of parameters that are followed together.
 #[derive(Debug, Clone)]
-pub(super) struct Found {
+pub(super) struct CommonChange {
     pub kind: ChangeKind,
     pub at: usize,
     /// Of each parameter, and its standard deviation.
@@ -70,7 +70,7 @@ fn shape(kind: ChangeKind, at: usize, times: &[f64]) -> Vec<f64> {
 }
 
 /// Of the ratio that is tested for another change besides `known` ones, where there is none.
-fn law(about: About, known: usize) -> Option<FisherSnedecor> {
+fn law(about: CourseSignals, known: usize) -> Option<FisherSnedecor> {
     let freedom = about.freedom(known + 1).max(1);
     FisherSnedecor::new(about.members.len() as f64, freedom as f64).ok()
 }
@@ -86,8 +86,8 @@ fn places(shown: &[usize]) -> &[usize] {
 // change taken out, for a change that is left in makes a walk. The deviation is scaled by the residual where that is
 // larger than the variances say. Of several parameters the likelihood ratio is tested, with the correlation of their
 // innovations (Basseville and Nikiforov 1993, section 7.2).
-pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
-    let mut found: Vec<Found> = Vec::new();
+pub(super) fn seek(about: CourseSignals, level: f64) -> (Vec<WalkSizes>, Vec<CommonChange>) {
+    let mut found: Vec<CommonChange> = Vec::new();
     let mut sizes = likeliest(about, &[], &TRIED).0;
     while found.len() < MAX_CHANGES && about.freedom(found.len() + 1) > about.members.len() {
         // a walk that is large enough hides a change, and a change that is left in makes a walk: both starts are tried
@@ -108,14 +108,18 @@ pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
 
 /// Size from which on a step of each parameter alone is reported at `level`; none where there are too few logs.
 // In the middle of the course; that size itself is reported in one course of two.
-pub(super) fn least_seen(about: About, sizes: &[Sizes], level: f64) -> Vec<Option<f64>> {
+pub(super) fn least_seen(
+    about: CourseSignals,
+    sizes: &[WalkSizes],
+    level: f64,
+) -> Vec<Option<f64>> {
     let (count, shown) = (about.members.len(), about.shown());
     let tried = 2 * places(&shown).len();
     let (true, Some(law)) = (tried > 0 && about.freedom(1) > 0, law(about, 0)) else {
         return vec![None; count];
     };
     let ratio = law.inverse_cdf(1.0 - level / tried as f64);
-    let white = White::new(about, sizes, &rests(about, &[]));
+    let white = CourseWhitener::new(about, sizes, &rests(about, &[]));
     let middle = shape(ChangeKind::Step, shown[shown.len() / 2], about.times);
     let steps = fitted(&white.columns(&middle), &white.signals(), 1.0);
     let least = |[_, std]: &[f64; 2]| (ratio * count as f64).sqrt() * std;
@@ -124,10 +128,10 @@ pub(super) fn least_seen(about: About, sizes: &[Sizes], level: f64) -> Vec<Optio
 }
 
 /// Sizes of walk and scatter of each parameter with changes taken out, and how unlikely the innovations are.
-fn likeliest(about: About, found: &[Found], walks: &[f64]) -> (Vec<Sizes>, f64) {
+fn likeliest(about: CourseSignals, found: &[CommonChange], walks: &[f64]) -> (Vec<WalkSizes>, f64) {
     let rests = rests(about, found);
     let members = about.members.iter().zip(&rests);
-    let all: Vec<(Sizes, f64)> = members
+    let all: Vec<(WalkSizes, f64)> = members
         .map(|(member, rest)| sizes(walks, rest, &member.variances, about.spacings))
         .collect();
     let cost = all.iter().map(|(_, cost)| cost).sum();
@@ -135,7 +139,11 @@ fn likeliest(about: About, found: &[Found], walks: &[f64]) -> (Vec<Sizes>, f64) 
 }
 
 /// The clearest change and the sizes with it taken out, each found anew by the other, and how unlikely the innovations are.
-fn settled(about: About, sizes: Vec<Sizes>, found: &[Found]) -> Option<(Found, Vec<Sizes>, f64)> {
+fn settled(
+    about: CourseSignals,
+    sizes: Vec<WalkSizes>,
+    found: &[CommonChange],
+) -> Option<(CommonChange, Vec<WalkSizes>, f64)> {
     let mut next = clearest(about, &sizes, found)?;
     let mut rounds = 0;
     loop {
@@ -152,7 +160,7 @@ fn settled(about: About, sizes: Vec<Sizes>, found: &[Found]) -> Option<(Found, V
 }
 
 /// The signals without changes.
-fn rests(about: About, changes: &[Found]) -> Vec<Vec<f64>> {
+fn rests(about: CourseSignals, changes: &[CommonChange]) -> Vec<Vec<f64>> {
     let mut rests: Vec<Vec<f64>> = (about.members.iter())
         .map(|member| member.values.clone())
         .collect();
@@ -167,23 +175,31 @@ fn rests(about: About, changes: &[Found]) -> Vec<Vec<f64>> {
 }
 
 /// What changes add, white.
-fn columns(about: About, white: &White, changes: &[Found]) -> Vec<Vec<f64>> {
+fn columns(
+    about: CourseSignals,
+    white: &CourseWhitener,
+    changes: &[CommonChange],
+) -> Vec<Vec<f64>> {
     let each = changes.iter();
     each.flat_map(|c| white.columns(&shape(c.kind, c.at, about.times)))
         .collect()
 }
 
 /// The clearest change besides those that are known.
-fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Found> {
+fn clearest(
+    about: CourseSignals,
+    sizes: &[WalkSizes],
+    found: &[CommonChange],
+) -> Option<CommonChange> {
     let law = law(about, found.len())?;
-    let white = White::new(about, sizes, &rests(about, found));
+    let white = CourseWhitener::new(about, sizes, &rests(about, found));
     let known = orthonormal(columns(about, &white, found).iter());
     let freedom = about.freedom(found.len() + 1).max(1) as f64;
     let residual = without(&white.signals(), &known);
     let square = dot(&residual, &residual);
     let shown = about.shown();
     let places = places(&shown);
-    let mut best: Option<(f64, Found)> = None;
+    let mut best: Option<(f64, CommonChange)> = None;
     for kind in [ChangeKind::Step, ChangeKind::Ramp] {
         for at in places.iter().copied() {
             let own = white.columns(&shape(kind, at, about.times));
@@ -195,7 +211,7 @@ fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Found> {
             if units.is_empty() || best.as_ref().is_some_and(|(most, _)| ratio <= *most) {
                 continue;
             }
-            let change = Found {
+            let change = CommonChange {
                 kind,
                 at,
                 sizes: fitted(&own, &residual, scale),
@@ -207,7 +223,7 @@ fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Found> {
         }
     }
     let tried = (2 * places.len()) as f64;
-    best.map(|(ratio, change)| Found {
+    best.map(|(ratio, change)| CommonChange {
         p_value: (tried * law.sf(ratio)).min(1.0),
         ..change
     })
@@ -215,7 +231,12 @@ fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Found> {
 
 /// Whether the robot carries something now and then: that some logs of that kind follow each other is no change.
 // So many logs on one side are not of that side, stand alone, or are as those that stood alone before it.
-fn carries(about: About, sizes: &[Sizes], found: &[Found], change: &Found) -> bool {
+fn carries(
+    about: CourseSignals,
+    sizes: &[WalkSizes],
+    found: &[CommonChange],
+    change: &CommonChange,
+) -> bool {
     let all = [found, std::slice::from_ref(change)].concat();
     let rests = rests(about, &all);
     let shape = shape(change.kind, change.at, about.times);
@@ -248,8 +269,8 @@ fn carries(about: About, sizes: &[Sizes], found: &[Found], change: &Found) -> bo
 }
 
 /// Sizes of changes that are fitted together, each with the deviation of its size.
-fn fit(about: About, sizes: &[Sizes], found: &mut [Found]) {
-    let white = White::new(about, sizes, &rests(about, found));
+fn fit(about: CourseSignals, sizes: &[WalkSizes], found: &mut [CommonChange]) {
+    let white = CourseWhitener::new(about, sizes, &rests(about, found));
     let columns = columns(about, &white, found);
     let signals = white.signals();
     let left = without(&signals, &orthonormal(columns.iter()));

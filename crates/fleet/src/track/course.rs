@@ -2,8 +2,8 @@
 
 use super::changes::{ChangeKind, ParameterChange, least_seen, seek};
 use super::local_level::smooth;
-use super::together::{About, Signal};
-use super::walk::{Sizes, median};
+use super::together::{CourseSignals, Signal};
+use super::walk::{WalkSizes, median};
 
 /// What one log says of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +18,7 @@ pub struct LogEstimate {
 
 /// A parameter over time.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Course {
+pub struct ParameterCourse {
     /// Smoothed parameter at each log, and its standard deviation (infinite where no log determines it).
     pub values: Vec<f64>,
     pub std: Vec<f64>,
@@ -43,7 +43,7 @@ const NEIGHBOURS: usize = 5;
 
 /// The course of a parameter from estimates in order of time. `level` is the probability at which a change is reported
 /// where there is none.
-pub fn follow(estimates: &[LogEstimate], level: f64) -> Course {
+pub fn follow(estimates: &[LogEstimate], level: f64) -> ParameterCourse {
     let mut courses = follow_together(&[estimates], None, level);
     courses.pop().unwrap_or_default()
 }
@@ -56,14 +56,14 @@ pub fn follow_together(
     parameters: &[&[LogEstimate]],
     correlation: Option<&[f64]>,
     level: f64,
-) -> Vec<Course> {
+) -> Vec<ParameterCourse> {
     let Some(first) = parameters.first() else {
         return Vec::new();
     };
     let times: Vec<f64> = first.iter().map(|e| e.time).collect();
     let spacings = spacings(&times);
     let signals: Vec<Signal> = parameters.iter().map(|own| Signal::of(own)).collect();
-    let about = About {
+    let about = CourseSignals {
         members: &signals,
         spacings: &spacings,
         times: &times,
@@ -80,7 +80,7 @@ pub fn follow_together(
             std: change.sizes[i][1],
             p_value: change.p_value,
         });
-        Course {
+        ParameterCourse {
             least_seen: least[i],
             ..signal.course(sizes, &spacings, changes.collect())
         }
@@ -109,7 +109,12 @@ impl Signal {
     }
 
     /// Its course with these changes.
-    fn course(&self, sizes: &Sizes, spacings: &[f64], changes: Vec<ParameterChange>) -> Course {
+    fn course(
+        &self,
+        sizes: &WalkSizes,
+        spacings: &[f64],
+        changes: Vec<ParameterChange>,
+    ) -> ParameterCourse {
         let mut all = sizes.variances(&self.variances, spacings);
         for change in &changes {
             match change.kind {
@@ -124,7 +129,7 @@ impl Signal {
             }
         }
         let (values, variance) = smooth(&self.determined(&self.values), &all);
-        Course {
+        ParameterCourse {
             values,
             std: variance.into_iter().map(f64::sqrt).collect(),
             changes,

@@ -6,7 +6,7 @@ use super::walk::median;
 
 /// The last level of one parameter of one robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Level {
+pub struct ParameterLevel {
     /// Number of the robot.
     pub robot: usize,
     /// Number of the parameter.
@@ -19,7 +19,7 @@ pub struct Level {
 /// A robot that differs from the others in one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotApart {
-    pub level: Level,
+    pub level: ParameterLevel,
     /// Median over all robots \[unit\].
     pub usual: f64,
     /// Standard deviation with which robots differ from each other, that of the level included.
@@ -33,14 +33,14 @@ const MIN_ROBOTS: usize = 5;
 
 /// Robots that differ from the others at `level`, all comparisons together; the clearest first. Robots that are alike
 /// differ by what their own parameters vary, which is taken from the middle of the fleet.
-pub fn apart(levels: &[Level], level: f64) -> Vec<RobotApart> {
+pub fn apart(levels: &[ParameterLevel], level: f64) -> Vec<RobotApart> {
     let mut all: Vec<RobotApart> = Vec::new();
     let mut parameters: Vec<usize> = levels.iter().map(|l| l.parameter).collect();
     parameters.sort_unstable();
     parameters.dedup();
     for parameter in parameters {
         let of_parameter = levels.iter().filter(|l| l.parameter == parameter);
-        let known: Vec<&Level> = of_parameter.filter(|l| l.std.is_finite()).collect();
+        let known: Vec<&ParameterLevel> = of_parameter.filter(|l| l.std.is_finite()).collect();
         let Some(usual) =
             median(known.iter().map(|l| l.value)).filter(|_| known.len() >= MIN_ROBOTS)
         else {
@@ -88,7 +88,7 @@ mod tests {
             for robot in 0..20 {
                 for parameter in 0..10 {
                     let other = (robot, parameter) == (7, 3);
-                    levels.push(Level {
+                    levels.push(ParameterLevel {
                         robot,
                         parameter,
                         value: 5.0 + 0.2 * draw() + if other { 4.0 } else { 0.0 },
@@ -104,8 +104,8 @@ mod tests {
             }
         }
         assert!(found >= 98 && false_alarms <= 14, "{found} {false_alarms}");
-        let few: Vec<Level> = (0..4)
-            .map(|robot| Level {
+        let few: Vec<ParameterLevel> = (0..4)
+            .map(|robot| ParameterLevel {
                 robot,
                 parameter: 0,
                 value: if robot == 0 { 100.0 } else { 1.0 },

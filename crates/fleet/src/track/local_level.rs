@@ -5,7 +5,7 @@
 
 /// Variances of a course: of each estimate, and of the walk before it.
 #[derive(Debug, Clone)]
-pub(super) struct Variances {
+pub(super) struct CourseVariances {
     /// Of e(k); infinite where nothing is known.
     pub estimate: Vec<f64>,
     /// Of w(k); that of the first does not matter.
@@ -14,7 +14,7 @@ pub(super) struct Variances {
 
 /// Gains and variances of the innovations, which depend on the variances alone.
 #[derive(Debug, Clone)]
-pub(super) struct Whitener {
+pub(super) struct InnovationGains {
     steps: Vec<Step>,
 }
 
@@ -25,8 +25,8 @@ enum Step {
     Innovation { gain: f64, std: f64 },
 }
 
-impl Whitener {
-    pub(super) fn new(variances: &Variances) -> Self {
+impl InnovationGains {
+    pub(super) fn new(variances: &CourseVariances) -> Self {
         let mut state: Option<f64> = None;
         let pairs = variances.estimate.iter().zip(&variances.walk);
         let steps = pairs.map(|(r, q)| {
@@ -50,7 +50,7 @@ impl Whitener {
                 }
             }
         });
-        Whitener {
+        InnovationGains {
             steps: steps.collect(),
         }
     }
@@ -91,7 +91,7 @@ impl Whitener {
 }
 
 /// Smoothed level and its variance at every estimate (fixed-interval smoother, as two filters that meet).
-pub(super) fn smooth(signal: &[f64], variances: &Variances) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn smooth(signal: &[f64], variances: &CourseVariances) -> (Vec<f64>, Vec<f64>) {
     let n = signal.len();
     let forward = filtered(signal, &variances.estimate, &variances.walk);
     let back = |x: &[f64]| x.iter().rev().copied().collect::<Vec<f64>>();
@@ -140,8 +140,8 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    fn variances() -> Variances {
-        Variances {
+    fn variances() -> CourseVariances {
+        CourseVariances {
             estimate: vec![1.0, 0.5, f64::INFINITY, 2.0, 0.7],
             walk: vec![0.0, 0.3, 0.2, 0.4, 0.0],
         }
@@ -169,7 +169,7 @@ mod tests {
         let level = (one.dot(&(&inverse * &y))) / one.dot(&(&inverse * &one));
         let e = &y - &one * level;
         let square = e.dot(&(&inverse * &e));
-        let whitener = Whitener::new(&variances());
+        let whitener = InnovationGains::new(&variances());
         let white = whitener.apply(&SIGNAL);
         let found: f64 = white.iter().map(|x| x * x).sum();
         assert!((found / square - 1.0).abs() < 1e-12, "{found} {square}");

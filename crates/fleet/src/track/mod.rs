@@ -14,5 +14,5 @@ mod together;
 mod walk;
 
 pub use changes::{ChangeKind, ParameterChange};
-pub use course::{Course, LogEstimate, follow, follow_together};
-pub use fleet::{Level, RobotApart, apart};
+pub use course::{LogEstimate, ParameterCourse, follow, follow_together};
+pub use fleet::{ParameterLevel, RobotApart, apart};

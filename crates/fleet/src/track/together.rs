@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::local_level::Whitener;
-use super::walk::{Sizes, median};
+use super::local_level::InnovationGains;
+use super::walk::{WalkSizes, median};
 
 /// Estimates of one parameter of those that are followed together.
 #[derive(Debug)]
@@ -27,7 +27,7 @@ impl Signal {
 
 /// What is known of courses.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct About<'a> {
+pub(super) struct CourseSignals<'a> {
     pub members: &'a [Signal],
     /// Spacings of the logs over the usual one.
     pub spacings: &'a [f64],
@@ -39,7 +39,7 @@ pub(super) struct About<'a> {
 /// What is estimated of each parameter besides the changes: level, walk and scatter.
 const OTHERS: usize = 3;
 
-impl About<'_> {
+impl CourseSignals<'_> {
     /// Estimates that say something, less what is estimated from them with so many changes.
     pub(super) fn freedom(&self, changes: usize) -> usize {
         let all = self.members.iter().flat_map(|member| &member.variances);
@@ -63,20 +63,20 @@ const CLIPPED: f64 = 2.5;
 const MOST_CORRELATED: f64 = 0.9;
 
 /// What makes signals of all courses white.
-pub(super) struct White<'a> {
-    about: About<'a>,
-    whiteners: Vec<Whitener>,
+pub(super) struct CourseWhitener<'a> {
+    about: CourseSignals<'a>,
+    whiteners: Vec<InnovationGains>,
     /// Lower Cholesky factor of the correlation of the innovations.
     factors: Vec<(u64, DMatrix<f64>)>,
 }
 
-impl<'a> White<'a> {
+impl<'a> CourseWhitener<'a> {
     /// By the sizes of walk and scatter; `rests` are signals without changes, whose innovations show how they go
     /// together.
-    pub(super) fn new(about: About<'a>, sizes: &[Sizes], rests: &[Vec<f64>]) -> Self {
+    pub(super) fn new(about: CourseSignals<'a>, sizes: &[WalkSizes], rests: &[Vec<f64>]) -> Self {
         let members = about.members.iter().zip(sizes);
-        let whiteners: Vec<Whitener> = members
-            .map(|(m, own)| Whitener::new(&own.variances(&m.variances, about.spacings)))
+        let whiteners: Vec<InnovationGains> = members
+            .map(|(m, own)| InnovationGains::new(&own.variances(&m.variances, about.spacings)))
             .collect();
         let correlation = match whiteners.len() {
             1 => DMatrix::identity(1, 1),
@@ -94,7 +94,7 @@ impl<'a> White<'a> {
             let factor = own.cholesky().map(|c| c.l());
             (mask, factor.unwrap_or(DMatrix::identity(size, size)))
         };
-        White {
+        CourseWhitener {
             factors: masks.into_iter().map(factor).collect(),
             about,
             whiteners,
@@ -138,7 +138,7 @@ impl<'a> White<'a> {
 }
 
 /// Courses with an innovation at a log, as bits.
-fn mask(whiteners: &[Whitener], log: usize) -> u64 {
+fn mask(whiteners: &[InnovationGains], log: usize) -> u64 {
     let own = whiteners.iter().enumerate();
     own.map(|(i, w)| u64::from(w.is_informative(log)) << i)
         .sum()
@@ -149,9 +149,13 @@ fn members_of(mask: u64, count: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Correlation of innovations of the same log, those that are far out clipped; drawn to what the fits say.
-fn correlation(whiteners: &[Whitener], rests: &[Vec<f64>], fits: Option<&[f64]>) -> DMatrix<f64> {
+fn correlation(
+    whiteners: &[InnovationGains],
+    rests: &[Vec<f64>],
+    fits: Option<&[f64]>,
+) -> DMatrix<f64> {
     let count = whiteners.len();
-    let clipped = |(own, rest): (&Whitener, &Vec<f64>)| {
+    let clipped = |(own, rest): (&InnovationGains, &Vec<f64>)| {
         let white = own.apply(rest);
         let known = white
             .iter()

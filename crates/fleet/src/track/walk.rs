@@ -1,6 +1,6 @@
 //! How far a parameter walks from log to log, and by how much estimates scatter beyond their variances.
 
-use super::local_level::{Variances, Whitener};
+use super::local_level::{CourseVariances, InnovationGains};
 
 /// Sizes of the walk and of the scatter that are tried, as variances over the median variance of an estimate.
 pub(super) const TRIED: [f64; 9] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
@@ -8,17 +8,17 @@ pub(super) const TRIED: [f64; 9] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 1
 const FREEDOM: f64 = 4.0;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Sizes {
+pub(super) struct WalkSizes {
     /// Variance of the walk over a usual time between two logs.
     pub walk: f64,
     /// Variance of the scatter.
     pub scatter: f64,
 }
 
-impl Sizes {
+impl WalkSizes {
     /// Variances of a course whose estimates have these; `spacings` over the usual one.
-    pub(super) fn variances(&self, estimate: &[f64], spacings: &[f64]) -> Variances {
-        Variances {
+    pub(super) fn variances(&self, estimate: &[f64], spacings: &[f64]) -> CourseVariances {
+        CourseVariances {
             estimate: estimate.iter().map(|r| r + self.scatter).collect(),
             walk: spacings.iter().map(|s| s * self.walk).collect(),
         }
@@ -45,18 +45,18 @@ pub(super) fn sizes(
     signal: &[f64],
     estimate: &[f64],
     spacings: &[f64],
-) -> (Sizes, f64) {
-    let mut best = (Sizes::default(), f64::INFINITY);
+) -> (WalkSizes, f64) {
+    let mut best = (WalkSizes::default(), f64::INFINITY);
     let Some(unit) = median(estimate.iter().copied()) else {
         return best;
     };
     for walk in walks {
         for scatter in TRIED {
-            let sizes = Sizes {
+            let sizes = WalkSizes {
                 walk: walk * unit,
                 scatter: scatter * unit,
             };
-            let whitener = Whitener::new(&sizes.variances(estimate, spacings));
+            let whitener = InnovationGains::new(&sizes.variances(estimate, spacings));
             let unlikely = |x: f64| 0.5 * (FREEDOM + 1.0) * (1.0 + x * x / (FREEDOM - 2.0)).ln();
             let innovations = whitener.apply(signal).into_iter();
             let cost = whitener.log_std() + innovations.map(unlikely).sum::<f64>();

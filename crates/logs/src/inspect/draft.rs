@@ -1,8 +1,8 @@
 //! Faults as they are reported: of a whole channel, or of stretches of it.
 
-use super::fault::{Episodes, FaultKind, LogFault, Severity};
-use super::findings::Findings;
-use super::judge::Track;
+use super::fault::{FaultEpisodes, FaultKind, LogFault, Severity};
+use super::findings::LogFindings;
+use super::judge::ChannelTrack;
 use crate::log::RowFault;
 use cft_ident_core::number::clock;
 
@@ -10,7 +10,7 @@ use cft_ident_core::number::clock;
 #[derive(Default)]
 pub(super) struct FaultList {
     /// What is found so far.
-    pub(super) found: Findings,
+    pub(super) found: LogFindings,
     /// Rows to leave out: from, to [s], and why.
     pub(super) cuts: Vec<([f64; 2], FaultKind)>,
     /// Stretches in which everything is frozen [s].
@@ -22,7 +22,7 @@ pub(super) struct FaultList {
 }
 
 /// How much a fault matters, what is wrong, and the channel where it is one's.
-pub(super) type Fault<'a> = (Severity, FaultKind, Option<&'a Track>);
+pub(super) type Fault<'a> = (Severity, FaultKind, Option<&'a ChannelTrack>);
 
 impl FaultList {
     /// No faults yet, of a log from `first` to `last` [s].
@@ -40,7 +40,7 @@ impl FaultList {
         &mut self,
         severity: Severity,
         kind: FaultKind,
-        track: &Track,
+        track: &ChannelTrack,
         effect: String,
         remedy: &str,
     ) {
@@ -58,7 +58,13 @@ impl FaultList {
     }
 
     /// Adds a fault for each stretch, or one for all of them where they are many; `effect` follows the number of rows.
-    pub(super) fn rows(&mut self, fault: Fault, episodes: &Episodes, effect: &str, remedy: &str) {
+    pub(super) fn rows(
+        &mut self,
+        fault: Fault,
+        episodes: &FaultEpisodes,
+        effect: &str,
+        remedy: &str,
+    ) {
         let effect = |rows: u64, times: usize| format!("{} {effect}", rows_text(rows, times));
         self.stretches(fault, episodes, &effect, remedy);
     }
@@ -67,7 +73,7 @@ impl FaultList {
     pub(super) fn stretches(
         &mut self,
         (severity, kind, track): Fault,
-        episodes: &Episodes,
+        episodes: &FaultEpisodes,
         effect: &dyn Fn(u64, usize) -> String,
         remedy: &str,
     ) -> &mut [LogFault] {
@@ -87,7 +93,7 @@ impl FaultList {
     }
 
     /// Leaves the rows of some stretches out, which were reported as this fault, unless the robot file keeps them.
-    pub(super) fn cut(&mut self, fault: Fault, episodes: &Episodes) {
+    pub(super) fn cut(&mut self, fault: Fault, episodes: &FaultEpisodes) {
         if self.acts(fault) {
             let spans = episodes.list.iter().map(|e| ([e.from, e.to], fault.1));
             self.cuts.extend(spans);
@@ -120,7 +126,7 @@ impl FaultList {
     }
 }
 
-fn name(track: Option<&Track>) -> Option<&str> {
+fn name(track: Option<&ChannelTrack>) -> Option<&str> {
     track.map(|track| track.channel.name.as_str())
 }
 

@@ -219,7 +219,7 @@ impl LogFault {
 
 /// Stretches of a log, in the order of time, few enough to be listed.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Episodes {
+pub(super) struct FaultEpisodes {
     pub(super) list: Vec<FaultEpisode>,
 }
 
@@ -236,7 +236,7 @@ const MAX_STRETCHES: usize = 1 << 18;
 /// Stretches that are faults of their own; more are one fault from the first to the last.
 const LISTED: usize = 12;
 
-impl Episodes {
+impl FaultEpisodes {
     /// Adds rows from `from` to `to`; joined to the last stretch where at most `join` s lie between.
     pub(super) fn add(&mut self, from: f64, to: f64, rows: u64, join: f64) {
         let full = self.list.len() >= MAX_STRETCHES;
@@ -276,7 +276,7 @@ mod tests {
     fn near_stretches_are_joined_and_many_are_reported_as_one() {
         let first =
             |found: &[(FaultEpisode, usize)]| (found[0].0.from, found[0].0.to, found[0].0.rows);
-        let mut episodes = Episodes::default();
+        let mut episodes = FaultEpisodes::default();
         episodes.add(1.0, 1.1, 2, 0.05);
         episodes.add(1.14, 1.2, 1, 0.05);
         episodes.add(2.0, 2.0, 1, 0.05);

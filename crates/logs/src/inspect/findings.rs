@@ -8,19 +8,20 @@ use serde::Serialize;
 use super::detectors::excitation::JointMotion;
 use super::fault::{FaultKind, LogFault, Severity};
 use super::words::ChannelRole;
-use crate::log::{Bridge, EvenSpacing};
+use crate::log::{BridgedSample, EvenSpacing};
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Inspection {
-    One(Box<Findings>),
-    Several(Several),
+    One(Box<LogFindings>),
+    Several(SeveralLogs),
 }
 
 /// Several logs as they were found.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Several {
+#[schemars(rename = "Several")]
+pub struct SeveralLogs {
     /// The slowest [Hz].
     pub rate_hz: Option<f64>,
     /// The worst.
@@ -29,7 +30,7 @@ pub struct Several {
     pub gaps: Vec<OfLog<Gap>>,
     pub joints: Vec<OfLog<JointMotion>>,
     pub faults: Vec<OfLog<LogFault>>,
-    pub logs: Vec<OfLog<Findings>>,
+    pub logs: Vec<OfLog<LogFindings>>,
 }
 
 /// What belongs to one log of several.
@@ -43,12 +44,12 @@ pub struct OfLog<T> {
 
 impl Inspection {
     /// The findings of logs, by their names.
-    pub fn of(logs: &[(String, Findings)]) -> Self {
+    pub fn of(logs: &[(String, LogFindings)]) -> Self {
         if let [(_, only)] = logs {
             return Inspection::One(Box::new(only.clone()));
         }
         let all = || logs.iter().map(|(_, findings)| findings);
-        Inspection::Several(Several {
+        Inspection::Several(SeveralLogs {
             rate_hz: all().filter_map(|f| f.rate_hz).reduce(f64::min),
             jitter: all().filter_map(|f| f.jitter).reduce(f64::max),
             channels: together(logs, |f| &f.channels),
@@ -62,8 +63,8 @@ impl Inspection {
 
 /// A list of every log in one, each entry with its log's name.
 fn together<T: Clone>(
-    logs: &[(String, Findings)],
-    list: impl Fn(&Findings) -> &[T],
+    logs: &[(String, LogFindings)],
+    list: impl Fn(&LogFindings) -> &[T],
 ) -> Vec<OfLog<T>> {
     let mut out = Vec::new();
     for (log, findings) in logs {
@@ -77,7 +78,8 @@ fn together<T: Clone>(
 
 /// A log as it was found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
-pub struct Findings {
+#[schemars(rename = "Findings")]
+pub struct LogFindings {
     /// Rows.
     pub rows: u64,
     /// Time of the first row by the log's own clock [s].
@@ -106,7 +108,7 @@ pub struct Findings {
     pub cuts: Vec<[f64; 2]>,
     /// Numbers that a fit puts in the place of spikes, in the order of time.
     #[serde(skip)]
-    pub bridges: Vec<Bridge>,
+    pub bridges: Vec<BridgedSample>,
     /// Times of the rows that a fit leaves out because nothing was read [s].
     #[serde(skip)]
     pub failed: Vec<f64>,
@@ -189,7 +191,7 @@ pub struct ChannelFacts {
     pub limits: Option<[f64; 2]>,
 }
 
-impl Findings {
+impl LogFindings {
     /// Brings the faults into their order: the worst first, then by time.
     pub fn sort(&mut self) {
         self.faults.sort_by(|a, b| {

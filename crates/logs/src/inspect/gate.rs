@@ -3,11 +3,11 @@
 
 use super::channel::InspectedChannel;
 use super::fault::{FaultKind, LogFault, Severity};
-use super::findings::{Findings, RowCost, RowFate, joined};
-use super::judge::{Depth, LogJudge};
+use super::findings::{LogFindings, RowCost, RowFate, joined};
+use super::judge::{InspectionDepth, LogJudge};
 use super::words::ChannelRole;
 use crate::log::{
-    Block, DeclaredChannels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
+    Block, DeclaredChannels, Instant, Layout, LogError, MendingSettings, Reader, RowFault, escape,
 };
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven clock closes none.
@@ -17,9 +17,9 @@ const MAX_READINGS: usize = 4;
 
 /// What the first look at a log found.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Gate {
+pub struct InspectionGate {
     /// What the last reading found.
-    found: Findings,
+    found: LogFindings,
     /// What every reading found that a fit leaves out or mends, and torques that are exactly 0 in motion.
     marked: Vec<LogFault>,
     /// Whether the robot moves as without its motors where they are, once known.
@@ -29,10 +29,10 @@ pub struct Gate {
     /// The instant from which the log's times are counted.
     origin: Instant,
     /// What is mended as the log is read.
-    mending: Mending,
+    mending: MendingSettings,
 }
 
-impl Gate {
+impl InspectionGate {
     /// Reads a log to its end, its channels as logged; `None` where `stop` asks for it. It is read
     /// again where the first look found what hides the rest: positions that begin anew, samples
     /// that were held; `also` gets every block, and the layout that it was read
@@ -46,11 +46,11 @@ impl Gate {
         stop: &dyn Fn() -> bool,
         also: &mut dyn FnMut(&Block, &Layout),
     ) -> Result<Option<Self>, LogError> {
-        let mut mending = Mending {
+        let mut mending = MendingSettings {
             keep_repeats: keep.contains(&RowFault::RepeatedRows),
-            ..Mending::default()
+            ..MendingSettings::default()
         };
-        let mut read = |mending: &Mending| -> Result<_, LogError> {
+        let mut read = |mending: &MendingSettings| -> Result<_, LogError> {
             let mut reader = open()?;
             reader.mend(mending);
             let found = findings(&mut reader, keep, stop, also)?;
@@ -145,7 +145,7 @@ impl Gate {
     }
 
     /// What a reader of the log is to mend.
-    pub fn mending(&self) -> &Mending {
+    pub fn mending(&self) -> &MendingSettings {
         &self.mending
     }
 
@@ -178,16 +178,16 @@ impl Gate {
 
     /// Takes rows out of the log so that a step is left that parts it: one longer than `longest` has it for the
     /// median step \[s\].
-    pub fn cutter(&self, longest: &dyn Fn(f64) -> f64) -> Cutter {
+    pub fn cutter(&self, longest: &dyn Fn(f64) -> f64) -> RowCutter {
         let dt = self.dt();
         let gap = CUT_GAP_FACTOR * longest(dt);
         let widened = self.found.cuts.iter().map(|[from, to]| {
             let more = (0.5 * (gap - (to - from))).max(0.6 * dt);
             [from - more, to + more]
         });
-        Cutter {
+        RowCutter {
             spans: widened.collect(),
-            ..Cutter::default()
+            ..RowCutter::default()
         }
     }
 
@@ -273,8 +273,8 @@ fn findings(
     keep: &[RowFault],
     stop: &dyn Fn() -> bool,
     also: &mut dyn FnMut(&Block, &Layout),
-) -> Result<Option<Findings>, LogError> {
-    let mut judge = LogJudge::new(channels(reader), Depth::Gate);
+) -> Result<Option<LogFindings>, LogError> {
+    let mut judge = LogJudge::new(channels(reader), InspectionDepth::Gate);
     judge.keep = keep.to_vec();
     let mut block = Block::default();
     let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -338,14 +338,14 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
 
 /// Takes rows out of the blocks of a log, which are given in order.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cutter {
+pub struct RowCutter {
     spans: Vec<[f64; 2]>,
     /// The first span that may reach into the next block.
     next: usize,
     removed: u64,
 }
 
-impl Cutter {
+impl RowCutter {
     /// Removes the rows that lie in a span.
     pub fn cut(&mut self, block: &mut Block) {
         let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else {
@@ -388,7 +388,7 @@ mod tests {
 
     #[test]
     fn what_is_cut_out_leaves_a_step_that_is_a_gap_across_blocks_too() {
-        let mut gate = Gate::default();
+        let mut gate = InspectionGate::default();
         gate.found.cuts = vec![[0.5, 0.5], [1.0, 1.4], [9.0, 9.0]];
         gate.found.rate_hz = Some(10.0);
         let mut cutter = gate.cutter(&|dt| 2.5 * dt);

@@ -2,19 +2,19 @@
 
 use super::channel::InspectedChannel;
 use super::detectors::clock::{LogClock, RowStep, mean_step, typical_step};
-use super::detectors::copies::Copies;
+use super::detectors::copies::CopyDetector;
 use super::detectors::dips::ZeroDips;
 use super::detectors::excitation::Excitation;
 use super::detectors::failed::FailedReads;
-use super::detectors::flat::Flat;
-use super::detectors::repeats::Repeats;
-use super::detectors::replays::Replays;
+use super::detectors::flat::FlatDetector;
+use super::detectors::repeats::RepeatDetector;
+use super::detectors::replays::ReplayDetector;
 use super::detectors::sampling::SamplingTimes;
-use super::detectors::spike::Spikes;
-use super::detectors::step::{FreshRows, Freshness, Leaps};
-use super::detectors::turn::Turns;
-use super::detectors::windows::Windows;
-use super::fault::{Episodes, FaultKind};
+use super::detectors::spike::SpikeDetector;
+use super::detectors::step::{FreshRows, LeapDetector, RowFreshness};
+use super::detectors::turn::TurnDetector;
+use super::detectors::windows::WindowSampler;
+use super::fault::{FaultEpisodes, FaultKind};
 use super::words::ChannelRole;
 use crate::log::RowFault;
 
@@ -33,7 +33,7 @@ const TEMPERATURE_LEAP_S: f64 = 1.0;
 
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Depth {
+pub enum InspectionDepth {
     /// What a fit must know before it begins: errors, and rows to leave out.
     Gate,
     /// Everything.
@@ -42,7 +42,7 @@ pub enum Depth {
 
 /// One channel's detectors.
 #[derive(Debug, Clone)]
-pub(super) struct Track {
+pub(super) struct ChannelTrack {
     pub(super) channel: InspectedChannel,
     /// Rows with a number.
     pub(super) rows: u64,
@@ -50,15 +50,15 @@ pub(super) struct Track {
     pub(super) high: f64,
     mean: f64,
     scatter: f64,
-    pub(super) missing: Episodes,
-    pub(super) beyond: Episodes,
-    pub(super) at_limit: Episodes,
+    pub(super) missing: FaultEpisodes,
+    pub(super) beyond: FaultEpisodes,
+    pub(super) at_limit: FaultEpisodes,
     /// Rows of a torque that the drive does not deliver.
-    pub(super) undelivered: Episodes,
-    pub(super) flat: Flat,
-    pub(super) spikes: Spikes,
-    pub(super) leaps: Leaps,
-    pub(super) turns: Turns,
+    pub(super) undelivered: FaultEpisodes,
+    pub(super) flat: FlatDetector,
+    pub(super) spikes: SpikeDetector,
+    pub(super) leaps: LeapDetector,
+    pub(super) turns: TurnDetector,
     pub(super) dips: ZeroDips,
     pub(super) excitation: Option<Excitation>,
     /// The channel with the position of the same joint.
@@ -67,13 +67,13 @@ pub(super) struct Track {
     latest: f64,
     before: f64,
     /// Leaps of a temperature, and the highest of them.
-    pub(super) leaps_of_heat: Episodes,
+    pub(super) leaps_of_heat: FaultEpisodes,
     pub(super) highest: f64,
     /// Whether its shape is looked at, or only its numbers.
     shaped: bool,
 }
 
-impl Track {
+impl ChannelTrack {
     fn new(channel: InspectedChannel, position: Option<usize>) -> Self {
         Self {
             shaped: channel.role.has_shape(),
@@ -83,20 +83,20 @@ impl Track {
             high: f64::NEG_INFINITY,
             mean: 0.0,
             scatter: 0.0,
-            missing: Episodes::default(),
-            beyond: Episodes::default(),
-            at_limit: Episodes::default(),
-            undelivered: Episodes::default(),
-            flat: Flat::default(),
-            spikes: Spikes::default(),
-            leaps: Leaps::default(),
-            turns: Turns::default(),
+            missing: FaultEpisodes::default(),
+            beyond: FaultEpisodes::default(),
+            at_limit: FaultEpisodes::default(),
+            undelivered: FaultEpisodes::default(),
+            flat: FlatDetector::default(),
+            spikes: SpikeDetector::default(),
+            leaps: LeapDetector::default(),
+            turns: TurnDetector::default(),
             dips: ZeroDips::default(),
             excitation: None,
             position,
             latest: f64::NAN,
             before: f64::NAN,
-            leaps_of_heat: Episodes::default(),
+            leaps_of_heat: FaultEpisodes::default(),
             highest: 0.0,
         }
     }
@@ -124,7 +124,7 @@ impl Track {
     fn take(
         &mut self,
         times: &[f64],
-        (steps, fresh): (&[RowStep], &[Freshness]),
+        (steps, fresh): (&[RowStep], &[RowFreshness]),
         values: &[f64],
         positions: Option<&[f64]>,
         join: f64,
@@ -156,9 +156,9 @@ impl Track {
             if self.channel.role == ChannelRole::Position {
                 self.turns.take(t, value);
                 match fresh[k] {
-                    Freshness::Repeats => {}
-                    Freshness::Fresh => self.leaps.take(t, value),
-                    Freshness::AfterRest(rested) => {
+                    RowFreshness::Repeats => {}
+                    RowFreshness::Fresh => self.leaps.take(t, value),
+                    RowFreshness::AfterRest(rested) => {
                         self.leaps.take(rested, self.latest);
                         self.leaps.take(t, value);
                     }
@@ -210,20 +210,20 @@ impl Track {
 /// Looks at the rows of one log.
 #[derive(Debug, Clone)]
 pub struct LogJudge {
-    pub(super) depth: Depth,
+    pub(super) depth: InspectionDepth,
     pub(super) clock: LogClock,
     pub(super) sampling: SamplingTimes,
     /// Mean step of the first rows [s].
     first_step: f64,
-    pub(super) tracks: Vec<Track>,
+    pub(super) tracks: Vec<ChannelTrack>,
     pub(super) failed: FailedReads,
-    pub(super) repeats: Repeats,
-    pub(super) replays: Replays,
-    pub(super) copies: Copies,
+    pub(super) repeats: RepeatDetector,
+    pub(super) replays: ReplayDetector,
+    pub(super) copies: CopyDetector,
     /// Channels whose copies are looked for.
     pub(super) compared: Vec<usize>,
     pub(super) positions: Vec<usize>,
-    pub(super) windows: Windows,
+    pub(super) windows: WindowSampler,
     /// Kinds of findings that are not acted upon.
     pub(super) keep: Vec<RowFault>,
     /// Band in which noise is counted \[Hz\].
@@ -238,7 +238,7 @@ pub struct LogJudge {
 
 impl LogJudge {
     /// For a log of these channels, time aside.
-    pub fn new(mut channels: Vec<InspectedChannel>, depth: Depth) -> Self {
+    pub fn new(mut channels: Vec<InspectedChannel>, depth: InspectionDepth) -> Self {
         let all = channels.iter_mut();
         let shaped = all.filter(|channel| channel.role.has_shape());
         for channel in shaped.skip(SHAPED) {
@@ -259,11 +259,11 @@ impl LogJudge {
             found.filter(|_| channel.role != ChannelRole::Position)
         };
         let tracks = (channels.iter())
-            .map(|channel| Track::new(channel.clone(), position_of(channel)))
+            .map(|channel| ChannelTrack::new(channel.clone(), position_of(channel)))
             .collect();
         let is_compared = |index: &usize| match (depth, channels[*index].role) {
-            (Depth::Gate, role) => role.is_fitted(),
-            (Depth::Whole, role) => role.has_shape() || role == ChannelRole::Command,
+            (InspectionDepth::Gate, role) => role.is_fitted(),
+            (InspectionDepth::Whole, role) => role.has_shape() || role == ChannelRole::Command,
         };
         let mut compared: Vec<usize> = (0..channels.len()).filter(is_compared).collect();
         compared.truncate(COMPARED);
@@ -279,15 +279,15 @@ impl LogJudge {
             band_hz: NOISE_BAND_HZ,
             messages: false,
             failed: FailedReads::new(positions.len()),
-            repeats: Repeats::new(positions.len(), others.len()),
-            replays: Replays::default(),
-            copies: Copies::new(compared.len()),
+            repeats: RepeatDetector::new(positions.len(), others.len()),
+            replays: ReplayDetector::default(),
+            copies: CopyDetector::new(compared.len()),
             compared,
             row: [vec![0.0; positions.len()], vec![0.0; others.len()]],
             others,
             positions,
             tracks,
-            windows: Windows::default(),
+            windows: WindowSampler::default(),
         }
     }
 
@@ -325,13 +325,13 @@ impl LogJudge {
             let mut pairs = columns.iter().zip(&self.tracks);
             pairs.all(|(column, track)| !track.shaped || column.iter().all(|x| x.is_finite()))
         };
-        if self.depth == Depth::Whole && whole && finite() {
+        if self.depth == InspectionDepth::Whole && whole && finite() {
             self.windows.offer(times, columns);
         }
     }
 
     /// Says of each row whether it repeats the positions of the row before.
-    fn look_for_fresh(&mut self, times: &[f64], columns: &[&[f64]]) -> Vec<Freshness> {
+    fn look_for_fresh(&mut self, times: &[f64], columns: &[&[f64]]) -> Vec<RowFreshness> {
         let row = &mut self.row[0];
         let each = times.iter().enumerate().map(|(k, t)| {
             gather(row, columns, &self.positions, k);
@@ -380,7 +380,7 @@ impl LogJudge {
     }
 
     /// Whether a position channel moves: further than its grain, and not far less than the others.
-    pub(super) fn moves(&self, track: &Track) -> bool {
+    pub(super) fn moves(&self, track: &ChannelTrack) -> bool {
         let positions = self.positions.iter();
         let travels = positions.map(|index| self.tracks[*index].travel());
         let farthest = travels.fold(0.0, f64::max);

@@ -2,9 +2,9 @@
 
 use super::channel::InspectedChannel;
 use super::fault::{FaultKind, Severity};
-use super::findings::{Findings, RowCost};
-use super::judge::{Depth, LogJudge};
-use crate::log::{EvenClock, EvenSpacing, LogError, RawBlock, RawReader, RowFault, Unwrap};
+use super::findings::{LogFindings, RowCost};
+use super::judge::{InspectionDepth, LogJudge};
+use crate::log::{EvenClock, EvenSpacing, LogError, PositionUnwrap, RawBlock, RawReader, RowFault};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +40,7 @@ pub struct ColumnPlan {
 
 impl ColumnPlan {
     /// Whether a look by it found what hides the rest, so that another one sees more ([`look_again`]).
-    pub fn hides(&self, found: &Findings) -> bool {
+    pub fn hides(&self, found: &LogFindings) -> bool {
         let turning = |(place, _): &(usize, f64)| self.channels[*place].wrap.is_none();
         found.wraps.iter().any(turning)
             || (found.held.is_some() && self.held.is_none())
@@ -56,9 +56,9 @@ impl ColumnPlan {
 pub fn look_again(
     log: &mut RawReader,
     plan: &mut ColumnPlan,
-    first: &Findings,
+    first: &LogFindings,
     stop: &dyn Fn() -> bool,
-) -> Result<Option<Findings>, LogError> {
+) -> Result<Option<LogFindings>, LogError> {
     for (place, range) in &first.wraps {
         plan.channels[*place].wrap = Some(*range);
     }
@@ -102,17 +102,17 @@ pub fn look(
     log: &mut RawReader,
     plan: &ColumnPlan,
     stop: &dyn Fn() -> bool,
-) -> Result<Option<Findings>, LogError> {
+) -> Result<Option<LogFindings>, LogError> {
     if let Some((column, seconds)) = plan.time {
         log.set_time(column, seconds);
     }
     let channels = plan.channels.iter().map(|planned| planned.channel.clone());
-    let mut judge = LogJudge::new(channels.collect(), Depth::Whole);
+    let mut judge = LogJudge::new(channels.collect(), InspectionDepth::Whole);
     judge.keep.clone_from(&plan.keep);
     judge.band_hz = plan.band_hz.unwrap_or(judge.band_hz);
     judge.messages = log.is_recording();
-    let mut turning: Vec<Option<Unwrap>> = (plan.channels.iter())
-        .map(|planned| planned.wrap.map(Unwrap::new))
+    let mut turning: Vec<Option<PositionUnwrap>> = (plan.channels.iter())
+        .map(|planned| planned.wrap.map(PositionUnwrap::new))
         .collect();
     let mut even = plan.even.map(EvenClock::new);
     let mut fresh = plan.held.map(|rows| FreshRows::new(rows, plan));

@@ -52,13 +52,14 @@ pub struct OrderComparison {
     /// For each joint: power of the logged torque.
     logged: Vec<f64>,
     /// The last two rows, as logged: stretch, time, model's torque, logged torque.
-    last: [Option<Last>; 2],
+    last: [Option<LastRow>; 2],
     /// For each joint the sums of r p', p' p' and r r: model's torque p, what it leaves r.
     slopes: Vec<[f64; 3]>,
 }
 
+/// The row before, with its torques by the model and as they were logged.
 #[derive(Debug, Clone)]
-struct Last {
+struct LastRow {
     segment: usize,
     t: f64,
     modelled: Vec<f64>,
@@ -110,7 +111,7 @@ impl OrderComparison {
                 *sum += x * y;
             }
         }
-        self.follow(Last {
+        self.follow(LastRow {
             segment,
             t,
             modelled: modelled[..n].to_vec(),
@@ -119,7 +120,7 @@ impl OrderComparison {
     }
 
     /// What a delay d would explain: tau(t) = p(t - d) leaves r = -d p'.
-    fn follow(&mut self, next: Last) {
+    fn follow(&mut self, next: LastRow) {
         if let [Some(before), Some(row)] = &self.last
             && before.segment == next.segment
             && next.t > before.t

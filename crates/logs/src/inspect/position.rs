@@ -2,11 +2,11 @@
 
 use super::detectors::clock::ClockFacts;
 use super::detectors::spike::SPIKE_SHARE;
-use super::detectors::step::Leap;
+use super::detectors::step::SampleLeap;
 use super::draft::{FaultList, rows_text};
 use super::fault::Severity::{Error, Warning};
-use super::fault::{Episodes, FaultKind};
-use super::judge::{LogJudge, Track};
+use super::fault::{FaultEpisodes, FaultKind};
+use super::judge::{ChannelTrack, LogJudge};
 use super::words::ChannelRole;
 use cft_ident_core::number;
 
@@ -20,12 +20,12 @@ const EVENT_FACTOR: f64 = 3.0;
 const SAME_EVENT_STEPS: f64 = 1.5;
 
 /// Leap of a position from one row to the next that its drive could make [unit of the channel].
-pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
+pub(super) fn drive(track: &ChannelTrack, clock: &ClockFacts) -> f64 {
     DRIVE_FACTOR * acceleration(track) * clock.dt * clock.dt
 }
 
 /// The largest acceleration in which no leap and no spike took part.
-fn acceleration(track: &Track) -> f64 {
+fn acceleration(track: &ChannelTrack) -> f64 {
     let usual = track.spikes.usual(track.deviation());
     let spikes = track.spikes.found.iter();
     let spikes = spikes.filter(|spike| spike.height.abs() > EVENT_FACTOR * usual);
@@ -37,13 +37,13 @@ fn acceleration(track: &Track) -> f64 {
 }
 
 /// The leaps that noise, encoder and drive do not account for, and the least height of one in a step of the clock.
-fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
+fn unusual(track: &ChannelTrack, clock: &ClockFacts) -> (Vec<SampleLeap>, f64) {
     let grain = track.flat.steps.quantile_not_zero(0.0);
     let noise = track.leaps.unusual(track.rows).max(MIN_LEAP_STEPS * grain);
     let acceleration = acceleration(track);
     // Rows that were left out leave the drive more time.
     let least = |step: f64| noise.max(DRIVE_FACTOR * acceleration * step * step);
-    let high = |leap: &&Leap| leap.height.abs() > least(leap.at - leap.before);
+    let high = |leap: &&SampleLeap| leap.height.abs() > least(leap.at - leap.before);
     let found = track.leaps.found.iter().filter(high).copied();
     (found.collect(), least(clock.dt))
 }
@@ -59,9 +59,9 @@ pub(super) fn leaps(
     let known = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
     let (mut found, least) = unusual(track, clock);
     found.retain(|leap| !known(leap.at));
-    let near = |leap: &Leap| [leap.before - reach, leap.at + reach];
+    let near = |leap: &SampleLeap| [leap.before - reach, leap.at + reach];
     shown.extend(found.iter().map(near));
-    let mut episodes = Episodes::default();
+    let mut episodes = FaultEpisodes::default();
     for leap in &found {
         episodes.add(leap.before, leap.at, 1, -1.0);
     }
@@ -101,7 +101,7 @@ pub(super) fn leaps(
 }
 
 /// Reports a position that leaps to and fro in so many rows that none of them is a spike among others.
-pub(super) fn erratic(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
+pub(super) fn erratic(judge: &LogJudge, track: &ChannelTrack, draft: &mut FaultList) {
     let grain = track.flat.steps.quantile_not_zero(0.0);
     let height = (SPIKE_SHARE * track.deviation()).max(MIN_LEAP_STEPS * grain);
     let hidden = track.spikes.nearly_all() > height && track.spikes.goes_to_and_fro();
@@ -124,7 +124,7 @@ pub(super) fn erratic(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
 }
 
 /// Where a position leaps: the times before and at it [s].
-pub(super) fn places(track: &Track, clock: &ClockFacts) -> Vec<[f64; 2]> {
+pub(super) fn places(track: &ChannelTrack, clock: &ClockFacts) -> Vec<[f64; 2]> {
     let (found, _) = unusual(track, clock);
     found.iter().map(|leap| [leap.before, leap.at]).collect()
 }
@@ -132,7 +132,7 @@ pub(super) fn places(track: &Track, clock: &ClockFacts) -> Vec<[f64; 2]> {
 /// Names of the other positions that leap at the same time.
 fn with_it(judge: &LogJudge, place: usize, t: f64, clock: &ClockFacts) -> Vec<String> {
     let others = judge.positions.iter().filter(|other| **other != place);
-    let leaps = |track: &Track| {
+    let leaps = |track: &ChannelTrack| {
         let (found, _) = unusual(track, clock);
         let mut at = found.iter().map(|leap| leap.at);
         at.any(|at| (at - t).abs() < SAME_EVENT_STEPS * clock.dt)
@@ -160,7 +160,7 @@ pub(super) fn wrapped(judge: &LogJudge, place: usize, draft: &mut FaultList) -> 
     let Some(found) = track.turns.wrapped(&usual, step) else {
         return false;
     };
-    let mut episodes = Episodes::default();
+    let mut episodes = FaultEpisodes::default();
     episodes.add(found.from, found.to, found.times, 0.0);
     let logged = found.range / size;
     let mut ranges = in_column.iter();

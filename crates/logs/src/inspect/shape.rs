@@ -8,11 +8,11 @@ use super::detectors::repeats::{ABRUPT_BENDS, MIN_STEPS_IN_MOTION};
 use super::detectors::spike::{SPIKE, SPIKE_SHARE};
 use super::draft::FaultList;
 use super::fault::Severity::{Error, Info, Warning};
-use super::fault::{Episodes, FaultKind};
-use super::judge::{Depth, LogJudge, Track};
+use super::fault::{FaultEpisodes, FaultKind};
+use super::judge::{ChannelTrack, InspectionDepth, LogJudge};
 use super::position;
 use super::words::ChannelRole;
-use crate::log::Bridge;
+use crate::log::BridgedSample;
 
 /// Rows of one value from which a channel may be stuck.
 const STUCK_ROWS: u64 = 10;
@@ -40,7 +40,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
         // Its shape is seen once it is followed through its turns.
         return;
     }
-    let mut flat = Flatness::of(judge, track, clock);
+    let mut flat = ChannelFlatness::of(judge, track, clock);
     flat.tops();
     flat.stuck();
     let stalled =
@@ -60,12 +60,12 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
         position::erratic(judge, track, draft);
     }
     spikes(judge, place, (clock, &shown), draft);
-    if judge.depth == Depth::Whole {
+    if judge.depth == InspectionDepth::Whole {
         coarse(judge, place, clock, draft);
     }
 }
 
-fn heat(track: &Track, draft: &mut FaultList) {
+fn heat(track: &ChannelTrack, draft: &mut FaultList) {
     if track.rows > 0 && track.travel() == 0.0 {
         let effect = format!(
             "{} in all {} rows: nothing can be seen to depend on it",
@@ -84,7 +84,7 @@ fn heat(track: &Track, draft: &mut FaultList) {
     draft.stretches(fault, &track.leaps_of_heat, &effect, remedy);
 }
 
-fn constant(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
+fn constant(judge: &LogJudge, track: &ChannelTrack, draft: &mut FaultList) {
     let joint_moves = track.position.is_some_and(|index| {
         let position = &judge.tracks[index];
         let step = position.flat.steps.quantile_not_zero(0.05);
@@ -119,8 +119,8 @@ fn constant(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
 }
 
 /// What is flat in a channel.
-struct Flatness<'a> {
-    track: &'a Track,
+struct ChannelFlatness<'a> {
+    track: &'a ChannelTrack,
     /// An edge with a larger step is abrupt.
     abrupt: f64,
     /// A joint moves where its steps are larger.
@@ -135,8 +135,8 @@ struct Flatness<'a> {
     stuck: Vec<FlatRun>,
 }
 
-impl<'a> Flatness<'a> {
-    fn of(judge: &LogJudge, track: &'a Track, clock: &ClockFacts) -> Self {
+impl<'a> ChannelFlatness<'a> {
+    fn of(judge: &LogJudge, track: &'a ChannelTrack, clock: &ClockFacts) -> Self {
         let flat = &track.flat;
         let bends = flat.bends.quantile_not_zero(0.99);
         let grain = flat.steps.quantile_not_zero(0.05);
@@ -214,7 +214,7 @@ impl<'a> Flatness<'a> {
         if self.track.channel.role != ChannelRole::Torque {
             return;
         }
-        let mut episodes = Episodes::default();
+        let mut episodes = FaultEpisodes::default();
         let mut runs: Vec<FlatRun> = self.tops.iter().chain(&self.stuck).copied().collect();
         runs.retain(|run| run.value == 0.0 && run.rows >= STUCK_ROWS);
         runs.sort_by(|a, b| a.from.total_cmp(&b.from));
@@ -237,7 +237,7 @@ impl<'a> Flatness<'a> {
         let used = role.is_fitted();
         let severity = if used { Warning } else { Info };
         let gathered = |runs: &[FlatRun]| {
-            let mut episodes = Episodes::default();
+            let mut episodes = FaultEpisodes::default();
             for run in runs {
                 // Noise about the limit breaks a flat top into many.
                 episodes.add(run.from, run.to, run.rows, 3.0 * (run.to - run.from));
@@ -313,7 +313,7 @@ fn spikes(
     let shown = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
     let mut high: Vec<_> = track.spikes.found.iter().collect();
     high.retain(|spike| spike.height.abs() > least && !shown(spike.t));
-    let mut episodes = Episodes::default();
+    let mut episodes = FaultEpisodes::default();
     let mut highest = 0.0f64;
     for spike in &high {
         episodes.add(spike.t, spike.t, 1, 3.5 * clock.dt);
@@ -338,7 +338,7 @@ fn spikes(
         let bad = |t: f64| high.iter().any(|spike| spike.t == t);
         for spike in &high {
             match spike.bridge(&bad) {
-                Some(value) => draft.found.bridges.push(Bridge {
+                Some(value) => draft.found.bridges.push(BridgedSample {
                     t: spike.t,
                     channel: place,
                     value,

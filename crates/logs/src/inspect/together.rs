@@ -1,13 +1,13 @@
 //! Faults that show between channels: copies, rows that repeat, velocities that lag.
 
 use super::detectors::clock::ClockFacts;
-use super::detectors::flat::Flat;
+use super::detectors::flat::FlatDetector;
 use super::detectors::grain;
 use super::detectors::velocity;
 use super::draft::{FaultList, seconds};
 use super::fault::Severity::{Error, Info, Warning};
-use super::fault::{Episodes, FaultKind, LogFault};
-use super::judge::{Depth, LogJudge, Track};
+use super::fault::{FaultEpisodes, FaultKind, LogFault};
+use super::judge::{ChannelTrack, InspectionDepth, LogJudge};
 use super::lag;
 use super::words::ChannelRole;
 use crate::log::escape;
@@ -27,7 +27,7 @@ const NOISELESS_SHARE_OF_RANGE: f64 = 1e-8;
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     copies(judge, draft);
     repeated_parts(judge, draft);
-    if judge.depth == Depth::Whole {
+    if judge.depth == InspectionDepth::Whole {
         // At the gate the reader has left them out already.
         repeated_rows(judge, clock, draft);
         velocities(judge, clock, draft);
@@ -37,14 +37,14 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
 }
 
 /// The positions' own steps.
-fn flats(judge: &LogJudge) -> Vec<&Flat> {
+fn flats(judge: &LogJudge) -> Vec<&FlatDetector> {
     let positions = judge.positions.iter();
     positions.map(|index| &judge.tracks[*index].flat).collect()
 }
 
 /// Stretches in which everything is frozen.
 pub(super) fn stalls(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
-    let mut episodes = Episodes::default();
+    let mut episodes = FaultEpisodes::default();
     for stall in &judge.repeats.stalls(&flats(judge)).list {
         // The robot leaps on from the last frozen row to the next.
         episodes.add(stall.from, stall.to + clock.dt, stall.rows, 0.0);
@@ -121,7 +121,7 @@ fn copies(judge: &LogJudge, draft: &mut FaultList) {
             true => ", with the other sign,",
             false => "",
         };
-        let equals = |other: &Track| {
+        let equals = |other: &ChannelTrack| {
             let name = escape(&other.channel.name);
             format!("equals `{name}`{sign} in every row")
         };

@@ -7,7 +7,7 @@ use super::detectors::grain;
 use super::draft::FaultList;
 use super::fault::FaultKind;
 use super::fault::Severity::Error;
-use super::judge::{Depth, LogJudge, Track};
+use super::judge::{ChannelTrack, InspectionDepth, LogJudge};
 use super::words::ChannelRole;
 
 /// Turns of a joint after which both directions are known.
@@ -27,7 +27,7 @@ enum SignLoss {
 }
 
 pub(super) fn faults(judge: &LogJudge, draft: &mut FaultList) {
-    let is_turned = |track: &&Track| {
+    let is_turned = |track: &&ChannelTrack| {
         let Some(position) = track.position.map(|index| &judge.tracks[index]) else {
             return false;
         };
@@ -36,11 +36,11 @@ pub(super) fn faults(judge: &LogJudge, draft: &mut FaultList) {
         };
         judge.moves(position) && motion.reversals() >= REVERSALS
     };
-    let torque = |track: &&Track| {
+    let torque = |track: &&ChannelTrack| {
         let channel = &track.channel;
         channel.role == ChannelRole::Torque && !channel.commands && track.travel() > 0.0
     };
-    let turned: Vec<&Track> = judge
+    let turned: Vec<&ChannelTrack> = judge
         .tracks
         .iter()
         .filter(torque)
@@ -56,7 +56,7 @@ pub(super) fn faults(judge: &LogJudge, draft: &mut FaultList) {
             .iter()
             .position(|other| std::ptr::eq(other, track));
         let cause = match (judge.depth, place) {
-            (Depth::Whole, Some(place)) => leaps(judge, place),
+            (InspectionDepth::Whole, Some(place)) => leaps(judge, place),
             _ => None,
         };
         let size = track.dips.lost_their_sign().then_some(SignLoss::Size);
@@ -68,12 +68,12 @@ pub(super) fn faults(judge: &LogJudge, draft: &mut FaultList) {
     }
 }
 
-fn one_sided(track: &Track) -> bool {
+fn one_sided(track: &ChannelTrack) -> bool {
     track.low >= 0.0 || track.high <= 0.0
 }
 
 /// Least and greatest size.
-fn sizes(track: &Track) -> (f64, f64) {
+fn sizes(track: &ChannelTrack) -> (f64, f64) {
     let (a, b) = (track.low.abs(), track.high.abs());
     (a.min(b), a.max(b))
 }
@@ -130,7 +130,7 @@ fn leaps(judge: &LogJudge, place: usize) -> Option<SignLoss> {
 
 const STATIC: &str = "or hold poses and fit gravity by `cft-ident lsq --static` with `sign = \"hang\"` in [log], which takes the sign from the side on which a joint hangs off its command";
 
-fn words(cause: &SignLoss, track: &Track) -> (String, String) {
+fn words(cause: &SignLoss, track: &ChannelTrack) -> (String, String) {
     let turns = "though the joint turns both ways";
     match cause {
         SignLoss::Size => (

@@ -6,9 +6,9 @@ use super::detectors::grain;
 use super::detectors::sampling::EvenRows;
 use super::draft::{FaultList, rows_text, seconds};
 use super::fault::Severity::{Error, Info, Warning};
-use super::fault::{Episodes, FaultKind};
-use super::findings::{ChannelFacts, Findings, Gap, RowCost, RowFate, joined};
-use super::judge::{Depth, LogJudge, Track};
+use super::fault::{FaultEpisodes, FaultKind};
+use super::findings::{ChannelFacts, Gap, LogFindings, RowCost, RowFate, joined};
+use super::judge::{ChannelTrack, InspectionDepth, LogJudge};
 use super::words::ChannelRole;
 use super::{shape, together, unsigned};
 use crate::log::round_within;
@@ -24,7 +24,7 @@ const MAX_WHOLE_JITTER_STEPS: f64 = 0.3;
 
 impl LogJudge {
     /// What there is to say about the log.
-    pub fn finish(mut self) -> Findings {
+    pub fn finish(mut self) -> LogFindings {
         for track in &mut self.tracks {
             track.part();
         }
@@ -34,7 +34,7 @@ impl LogJudge {
     }
 }
 
-fn conclude(judge: &LogJudge) -> Findings {
+fn conclude(judge: &LogJudge) -> LogFindings {
     let clock = judge.clock.facts();
     let first = judge.clock.first.unwrap_or(0.0);
     let mut draft = FaultList::new(first, first + judge.clock.duration().max(0.0), &judge.keep);
@@ -55,7 +55,7 @@ fn conclude(judge: &LogJudge) -> Findings {
         to_s: to - first,
     };
     let places = 0..judge.tracks.len();
-    let mut found = Findings {
+    let mut found = LogFindings {
         rows: judge.clock.rows,
         begins_s: first,
         duration_s: judge.clock.duration(),
@@ -117,7 +117,7 @@ fn costs(draft: &FaultList, clock: &ClockFacts) -> Vec<RowCost> {
 /// Rows in which every channel reads one number.
 fn failed_reads(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     let (times, value) = (&judge.failed.times, judge.failed.value);
-    let mut episodes = Episodes::default();
+    let mut episodes = FaultEpisodes::default();
     for t in times {
         episodes.add(*t, *t, 1, 1.5 * clock.dt);
     }
@@ -137,8 +137,8 @@ fn channel_facts(judge: &LogJudge, place: usize, rate: Option<f64>) -> ChannelFa
     let number = |x: f64| x.is_finite().then_some(x);
     let share = track.rows as f64 / judge.clock.rows.max(1) as f64;
     let step = match judge.depth {
-        Depth::Gate => None,
-        Depth::Whole => grain::step(&judge.windows.kept, place),
+        InspectionDepth::Gate => None,
+        InspectionDepth::Whole => grain::step(&judge.windows.kept, place),
     };
     ChannelFacts {
         name: track.channel.name.clone(),
@@ -299,7 +299,7 @@ fn often(times: usize, what: &str) -> String {
 
 /// Steps that are much longer than the others.
 fn gap_faults(clock: &ClockFacts, draft: &mut FaultList) {
-    let mut gaps = Episodes::default();
+    let mut gaps = FaultEpisodes::default();
     for [from, to] in &clock.gaps {
         let lost = ((to - from) / clock.dt).round() - 1.0;
         gaps.add(*from, *to, lost.clamp(0.0, 1e15) as u64, -1.0);
@@ -322,7 +322,7 @@ fn speed_faults(judge: &LogJudge, place: usize, draft: &mut FaultList) {
     let (Some(limit), Some(motion)) = (track.channel.speed, &track.excitation) else {
         return;
     };
-    let of_joint = |other: &Track| {
+    let of_joint = |other: &ChannelTrack| {
         other.channel.role == ChannelRole::Velocity && other.channel.joint == track.channel.joint
     };
     if judge.tracks.iter().any(of_joint) {
@@ -337,7 +337,7 @@ fn speed_faults(judge: &LogJudge, place: usize, draft: &mut FaultList) {
     draft.rows(fault, &motion.too_fast, &effect, remedy);
 }
 
-fn number_faults(track: &Track, messages: bool, draft: &mut FaultList) {
+fn number_faults(track: &ChannelTrack, messages: bool, draft: &mut FaultList) {
     let used = track.channel.role.is_fitted();
     if track.rows == 0 && !used {
         // A column of words is no channel.

@@ -41,14 +41,14 @@ impl ChannelRole {
 
 /// A word of a name: letters alone in lower case, or digits alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Word {
+pub struct NameWord {
     /// Its letters or digits.
     pub text: String,
     /// Where it stands in the name [bytes].
     pub at: Range<usize>,
 }
 
-impl Word {
+impl NameWord {
     /// The number that it is.
     pub fn number(&self) -> Option<u32> {
         self.text.parse().ok()
@@ -66,8 +66,8 @@ fn begins_word(rest: &str) -> bool {
 
 /// The words of a name: they end where letters and digits meet, at every other sign, before a capital behind
 /// two small letters, and before a capital that a small letter follows.
-pub fn words(name: &str) -> Vec<Word> {
-    let mut out: Vec<Word> = Vec::new();
+pub fn words(name: &str) -> Vec<NameWord> {
+    let mut out: Vec<NameWord> = Vec::new();
     let (mut before, mut small) = (None::<char>, 0);
     for (at, c) in name.char_indices() {
         if !c.is_alphanumeric() {
@@ -88,7 +88,7 @@ pub fn words(name: &str) -> Vec<Word> {
             }
             None => {
                 small = 0;
-                out.push(Word {
+                out.push(NameWord {
                     text: c.to_lowercase().collect(),
                     at: at..end,
                 });
@@ -147,7 +147,7 @@ pub enum NamedDrive {
 }
 
 /// What words call a torque channel. `current` before a torque is an adjective, behind it a noun.
-pub fn drive(words: &[Word]) -> NamedDrive {
+pub fn drive(words: &[NameWord]) -> NamedDrive {
     let last = |known: &str| words.iter().rposition(|word| lists(known, &word.text));
     let (torque, current) = (last(TORQUES), last(CURRENTS));
     match (torque, current) {
@@ -167,7 +167,7 @@ pub fn drive(words: &[Word]) -> NamedDrive {
 }
 
 /// Whether words are of a joint that slides.
-pub fn slides(words: &[Word]) -> bool {
+pub fn slides(words: &[NameWord]) -> bool {
     has(words, SLIDING) && !has(words, "actuator")
 }
 
@@ -177,19 +177,19 @@ pub fn lists(known: &str, word: &str) -> bool {
 }
 
 /// Whether one of these words is in a list.
-pub fn has(words: &[Word], known: &str) -> bool {
+pub fn has(words: &[NameWord], known: &str) -> bool {
     words.iter().any(|word| lists(known, &word.text))
 }
 
 /// Whether words name what was commanded: `q_ref`, `target`, `q_d` of a desired one, a leader's.
-pub fn is_command(words: &[Word]) -> bool {
-    let desired = |pair: &[Word]| {
+pub fn is_command(words: &[NameWord]) -> bool {
+    let desired = |pair: &[NameWord]| {
         let of = &pair[0].text;
         let short = [POSITIONS, VELOCITIES, TORQUES, "j"];
         pair[1].text == "d" && short.iter().any(|known| lists(known, of))
     };
     // mc_rtc has qIn and qOut, KUKA's sensor interface AIPos and ASPos
-    let out = |pair: &[Word]| match &*pair[1].text {
+    let out = |pair: &[NameWord]| match &*pair[1].text {
         "out" => lists("q alpha tau pos vel", &pair[0].text),
         "pos" => pair[0].text == "as",
         _ => false,
@@ -198,9 +198,9 @@ pub fn is_command(words: &[Word]) -> bool {
 }
 
 /// Whether words are of what is about a channel and no channel itself, or of the tool and no joint.
-pub fn is_aside(words: &[Word]) -> bool {
+pub fn is_aside(words: &[NameWord]) -> bool {
     // UR's `tool_vector`, KUKA's `RIst.X`
-    let of_tool = |pair: &[Word]| match &*pair[0].text {
+    let of_tool = |pair: &[NameWord]| match &*pair[0].text {
         "tool" => lists("vector force accelerometer pose", &pair[1].text),
         "ri" | "rs" => lists("st ist sol soll", &pair[1].text),
         _ => false,
@@ -209,27 +209,27 @@ pub fn is_aside(words: &[Word]) -> bool {
 }
 
 /// Whether words of a torque say that it is an estimate of what acts from outside, and no measured torque.
-pub fn is_external(words: &[Word]) -> bool {
+pub fn is_external(words: &[NameWord]) -> bool {
     has(words, NOT_MEASURED)
 }
 
 /// What words say a channel holds, whether or not it was commanded; `None` where nothing.
-pub fn role(words: &[Word]) -> Option<ChannelRole> {
+pub fn role(words: &[NameWord]) -> Option<ChannelRole> {
     if is_aside(words) {
         return Some(ChannelRole::Other);
     }
     if has(words, ACCELERATIONS) || has(words, "ddot") {
         return Some(ChannelRole::Acceleration);
     }
-    let alpha = |pair: &[Word]| pair[0].text == "alpha" && lists("in out", &pair[1].text);
+    let alpha = |pair: &[NameWord]| pair[0].text == "alpha" && lists("in out", &pair[1].text);
     if has(words, VELOCITIES) || has(words, "dot") || words.windows(2).any(alpha) {
         return Some(ChannelRole::Velocity);
     }
     // tau_q1 is the torque of q1
-    let short = |word: &Word| word.text == "q";
+    let short = |word: &NameWord| word.text == "q";
     let position = words.iter().any(|w| !short(w) && lists(POSITIONS, &w.text));
     // a dataset of LeRobot calls positions the observed state
-    let observed = |pair: &[Word]| pair[0].text == "observation" && pair[1].text == "state";
+    let observed = |pair: &[NameWord]| pair[0].text == "observation" && pair[1].text == "state";
     match (
         position || words.windows(2).any(observed),
         has(words, TORQUES),
@@ -250,9 +250,9 @@ const NOISE: &str = "\
     newton amperes";
 
 /// Where the words of a joint stand in those of a name, in a row [bytes].
-pub fn place_of(spoken: &[Word], joint: &str) -> Option<Range<usize>> {
+pub fn place_of(spoken: &[NameWord], joint: &str) -> Option<Range<usize>> {
     let joint = words(joint);
-    let same = |at: &&[Word]| at.iter().zip(&joint).all(|(a, b)| a.text == b.text);
+    let same = |at: &&[NameWord]| at.iter().zip(&joint).all(|(a, b)| a.text == b.text);
     let found = spoken.windows(joint.len().max(1)).find(same)?;
     Some(found.first()?.at.start..found.last()?.at.end)
 }
@@ -282,7 +282,7 @@ pub fn without_units(name: &str) -> String {
 }
 
 /// What is left of a name when the words of its role and of its unit are taken out: the joint.
-pub fn joint(words: &[Word]) -> String {
+pub fn joint(words: &[NameWord]) -> String {
     let of_role = [ACCELERATIONS, VELOCITIES, POSITIONS, TORQUES, CURRENTS];
     let said = |word: &str| {
         lists(NOISE, word) || lists("dot ddot", word) || of_role.iter().any(|of| lists(of, word))

@@ -4,27 +4,27 @@ use std::sync::Arc;
 
 use super::layout::Layout;
 use super::rows::LogRows;
-use super::source::Checksum;
-use super::temperatures::Temperatures;
-use super::time::Stamped;
+use super::source::SourceChecksum;
+use super::temperatures::JointTemperatures;
+use super::time::RowTime;
 use super::{Block, LogError};
 use cft_ident_core::number::{beyond, is_usable};
 
 /// Times, joint positions and joint torques of one log, in SI units, row after row.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Arrays {
+pub struct LogArrays {
     name: String,
     t: Vec<f64>,
     q: Vec<f64>,
     tau: Vec<f64>,
     /// The positions that the controller was asked for, as a log of their own.
-    references: Option<Arc<Arrays>>,
+    references: Option<Arc<LogArrays>>,
     /// Temperatures of joints [degC], each with one value per row.
     temperatures: Vec<(usize, Vec<f64>)>,
     sha256: String,
 }
 
-impl Arrays {
+impl LogArrays {
     /// Rows of a log: `t` [s], `q` [m or rad] and `tau` [N or Nm] with one value per joint and row;
     /// `tau` may be empty. Whether the numbers can be used is seen as they are read.
     ///
@@ -38,7 +38,7 @@ impl Arrays {
         if !tau.is_empty() && tau.len() != q.len() {
             return Err(shape(of, "tau", tau.len(), TORQUES));
         }
-        let mut checksum = Checksum::default();
+        let mut checksum = SourceChecksum::default();
         for value in t.iter().chain(&q).chain(&tau) {
             checksum.update(&value.to_le_bytes());
         }
@@ -100,9 +100,9 @@ impl Arrays {
     }
 
     /// The temperatures that were given.
-    pub fn temperatures(&self) -> Temperatures {
+    pub fn temperatures(&self) -> JointTemperatures {
         let columns = self.temperatures.iter();
-        Temperatures::of_columns(&self.t, columns.map(|(j, x)| (*j, x.as_slice())))
+        JointTemperatures::of_columns(&self.t, columns.map(|(j, x)| (*j, x.as_slice())))
     }
 
     /// The same log with the torques of each joint times a factor of its own.
@@ -131,7 +131,7 @@ impl Arrays {
     }
 
     /// The references as the positions of a log without torques.
-    pub fn references(&self) -> Option<&Arc<Arrays>> {
+    pub fn references(&self) -> Option<&Arc<LogArrays>> {
         self.references.as_ref()
     }
 }
@@ -156,7 +156,7 @@ fn shape(
 }
 
 pub(super) struct ArrayRows {
-    arrays: Arc<Arrays>,
+    arrays: Arc<LogArrays>,
     /// Names of the positions, then of the torques that are read.
     names: Vec<String>,
     joints: usize,
@@ -165,7 +165,7 @@ pub(super) struct ArrayRows {
 }
 
 impl ArrayRows {
-    pub(super) fn open(arrays: &Arc<Arrays>, layout: &Layout) -> Result<Self, LogError> {
+    pub(super) fn open(arrays: &Arc<LogArrays>, layout: &Layout) -> Result<Self, LogError> {
         let joints = layout.positions.len();
         let (of, values) = ((arrays.name(), arrays.t.len()), arrays.q.len());
         if values != joints * arrays.t.len() {
@@ -202,13 +202,13 @@ impl ArrayRows {
 }
 
 impl LogRows for ArrayRows {
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         let Some(t) = self.arrays.t.get(self.row).copied() else {
             return Ok(None);
         };
         self.row += 1;
         match is_usable(t) {
-            true => Ok(Some(Stamped::Seconds(t))),
+            true => Ok(Some(RowTime::Seconds(t))),
             false => Err(self.not_finite("t", t)),
         }
     }
@@ -230,7 +230,7 @@ impl LogRows for ArrayRows {
         let Some(before) = self.row.checked_sub(2) else {
             return false;
         };
-        let Arrays { t, q, tau, .. } = &*self.arrays;
+        let LogArrays { t, q, tau, .. } = &*self.arrays;
         let mut parts = [(t, 1), (q, self.joints), (tau, self.joints)].into_iter();
         parts.all(|(x, n)| {
             x.get(before * n..(before + 1) * n) == x.get((before + 1) * n..(before + 2) * n)
@@ -260,7 +260,7 @@ mod tests {
     use super::*;
 
     fn read(t: &[f64], q: &[f64], tau: &[f64]) -> Result<Block, LogError> {
-        let arrays = Arrays::new("arm", t.to_vec(), q.to_vec(), tau.to_vec())?;
+        let arrays = LogArrays::new("arm", t.to_vec(), q.to_vec(), tau.to_vec())?;
         let layout = Layout::joint_columns(&["q1", "q2"]);
         let mut reader = Reader::of_arrays(&Arc::new(arrays), layout)?;
         let mut block = Block::default();

@@ -3,7 +3,7 @@
 use std::io::{self, BufReader, Chain, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::stream::Hashed;
+use super::stream::HashedReader;
 use super::{LogError, source, table};
 
 /// How the JSON documents of this program begin.
@@ -14,8 +14,9 @@ pub const REDUCED: &[u8] = b"cft-ident reduced\n";
 /// Bytes that are looked at.
 pub(super) const HEAD: usize = 1 << 16;
 
+/// How the bytes of a file are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Compression {
+pub(super) enum CompressionFormat {
     None,
     Gzip,
     Zstd,
@@ -24,28 +25,30 @@ pub(super) enum Compression {
     Bzip2,
 }
 
-pub(super) type Bytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
+/// The bytes of a file from its first one on, those that were looked at among them.
+pub(super) type ContentBytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
 
-pub(super) struct Content {
-    pub(super) compression: Compression,
+/// A file that is open: how it is compressed, its size, and its bytes.
+pub(super) struct FileContent {
+    pub(super) compression: CompressionFormat,
     /// Length of the file as it lies on the disk [bytes].
     pub(super) size: u64,
     head: Vec<u8>,
     rest: Box<dyn Read + Send>,
     /// What is known of a stream while it arrives; none of a file.
-    pub(super) watch: Option<Hashed>,
+    pub(super) watch: Option<HashedReader>,
     /// The bytes of the file as they lie on the disk; none of a stream and of several files.
-    pub(super) raw: Option<Hashed>,
+    pub(super) raw: Option<HashedReader>,
     /// Whether the text is that of a table which is none: its lines stand nowhere.
     pub(super) table: bool,
     /// What was left out of a table.
     pub(super) notes: Vec<String>,
 }
 
-impl Content {
+impl FileContent {
     fn new(head: Vec<u8>, rest: impl Read + Send + 'static) -> Self {
         Self {
-            compression: Compression::None,
+            compression: CompressionFormat::None,
             size: 0,
             head,
             rest: Box::new(rest),
@@ -66,19 +69,19 @@ impl Content {
         let file = source::open(path)?;
         let size = file.metadata().map_err(fail)?.len();
         let whole = file.from(0);
-        let raw = Hashed::new(file);
+        let raw = HashedReader::new(file);
         let mut file = raw.clone();
         let mut magic = Vec::new();
         let read = Read::by_ref(&mut file).take(6).read_to_end(&mut magic);
         read.map_err(fail)?;
         let compression = match magic[..] {
-            [0x1f, 0x8b, ..] => Compression::Gzip,
-            _ if magic.starts_with(&ZSTD) => Compression::Zstd,
-            _ if magic == XZ => Compression::Xz,
-            _ if magic.starts_with(&LZ4) => Compression::Lz4,
+            [0x1f, 0x8b, ..] => CompressionFormat::Gzip,
+            _ if magic.starts_with(&ZSTD) => CompressionFormat::Zstd,
+            _ if magic == XZ => CompressionFormat::Xz,
+            _ if magic.starts_with(&LZ4) => CompressionFormat::Lz4,
             // its level, then the beginning of pi
-            [b'B', b'Z', b'h', b'1'..=b'9', b'1', b'A'] => Compression::Bzip2,
-            _ => Compression::None,
+            [b'B', b'Z', b'h', b'1'..=b'9', b'1', b'A'] => CompressionFormat::Bzip2,
+            _ => CompressionFormat::None,
         };
         let mut rest = plain(Cursor::new(magic).chain(file), compression).map_err(fail)?;
         let (mut head, read) = head_of(&mut rest);
@@ -89,7 +92,7 @@ impl Content {
             }
             rest = Box::new(CutOff(error.kind(), error.to_string()));
         }
-        if compression == Compression::None && table::is_table(&head) {
+        if compression == CompressionFormat::None && table::is_table(&head) {
             let mut text = table::open(path, &whole, &head, more)?;
             let read;
             (head, read) = head_of(&mut text);
@@ -119,7 +122,7 @@ impl Content {
 
     /// Text that arrives while it is read: no more of it is waited for than its first two lines.
     pub(super) fn of_stream(path: &Path, stream: Box<dyn Read + Send>) -> Result<Self, LogError> {
-        let mut rest = Hashed::new(stream);
+        let mut rest = HashedReader::new(stream);
         let mut head = vec![0; HEAD];
         let mut filled = 0;
         while filled < HEAD && !has_two_lines(&head[..filled]) {
@@ -142,7 +145,7 @@ impl Content {
     }
 
     /// All bytes from the beginning, decompressed.
-    pub(super) fn into_bytes(self) -> Bytes {
+    pub(super) fn into_bytes(self) -> ContentBytes {
         Cursor::new(self.head).chain(self.rest)
     }
 }
@@ -172,12 +175,12 @@ const LARGEST_RATIO: usize = 1024;
 
 /// Decompresses messages that were compressed one by one; its memory is used again.
 #[derive(Default)]
-pub(super) struct Unpacker {
+pub(super) struct MessageUnpacker {
     inner: Option<zstd::bulk::Decompressor<'static>>,
     plain: Vec<u8>,
 }
 
-impl Unpacker {
+impl MessageUnpacker {
     /// Decompresses a message in place; one that is not compressed, or damaged, stays as it is.
     pub(super) fn unpack(&mut self, data: &mut Vec<u8>) {
         if !data.starts_with(&ZSTD) {
@@ -239,14 +242,16 @@ impl Read for CutOff {
 }
 
 fn plain(
-    file: Chain<Cursor<Vec<u8>>, Hashed>,
-    compression: Compression,
+    file: Chain<Cursor<Vec<u8>>, HashedReader>,
+    compression: CompressionFormat,
 ) -> io::Result<Box<dyn Read + Send>> {
     Ok(match compression {
-        Compression::None => Box::new(file),
-        Compression::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(file))),
-        Compression::Zstd => Box::new(zstd::stream::read::Decoder::new(file)?),
-        Compression::Xz => {
+        CompressionFormat::None => Box::new(file),
+        CompressionFormat::Gzip => {
+            Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(file)))
+        }
+        CompressionFormat::Zstd => Box::new(zstd::stream::read::Decoder::new(file)?),
+        CompressionFormat::Xz => {
             // the crate unpacks a file as a whole
             let mut plain = tempfile::tempfile()?;
             lzma_rs::xz_decompress(&mut BufReader::new(file), &mut plain)
@@ -254,7 +259,7 @@ fn plain(
             plain.seek(SeekFrom::Start(0))?;
             Box::new(BufReader::new(plain))
         }
-        Compression::Lz4 => Box::new(lz4::Decoder::new(file)?),
-        Compression::Bzip2 => Box::new(bzip2::read::MultiBzDecoder::new(file)),
+        CompressionFormat::Lz4 => Box::new(lz4::Decoder::new(file)?),
+        CompressionFormat::Bzip2 => Box::new(bzip2::read::MultiBzDecoder::new(file)),
     })
 }

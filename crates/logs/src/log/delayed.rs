@@ -3,14 +3,14 @@
 use std::collections::VecDeque;
 
 use super::rows::{LogRows, counted};
-use super::time::{Instant, Stamped};
+use super::time::{Instant, RowTime};
 use super::{Block, LogError};
 
 /// A step longer than this many usual ones is a dropout, over which nothing is interpolated.
 const DROPOUT_STEPS: f64 = 2.5;
 
 struct WaitingRow {
-    stamp: Stamped,
+    stamp: RowTime,
     t: f64,
     block: Block,
     number: u64,
@@ -93,7 +93,7 @@ impl LogRows for DelayedRows {
         self.inner.names()
     }
 
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         loop {
             while self.rows.len() <= self.next && self.read()? {}
             let Some(row) = self.rows.get(self.next) else {
@@ -194,9 +194,9 @@ mod tests {
     struct Late(f64, u32);
 
     impl LogRows for Late {
-        fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        fn next(&mut self) -> Result<Option<RowTime>, LogError> {
             self.1 += 1;
-            Ok((self.1 < 200).then(|| Stamped::Seconds(f64::from(self.1) * 0.01)))
+            Ok((self.1 < 200).then(|| RowTime::Seconds(f64::from(self.1) * 0.01)))
         }
 
         fn append(&self, block: &mut Block) -> Result<(), LogError> {

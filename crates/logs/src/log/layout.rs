@@ -89,9 +89,9 @@ type RowMap = dyn Fn(&mut [f64], &mut [f64], &mut [f64]) -> bool + Send + Sync;
 
 /// A conversion that the reader applies to every row, so that its blocks are joint-side.
 #[derive(Clone)]
-pub struct Conversion(Arc<RowMap>);
+pub struct RowConversion(Arc<RowMap>);
 
-impl Conversion {
+impl RowConversion {
     /// Wraps a map of one row `(positions, torques, velocities)`; torques and velocities are empty
     /// where the log has none.
     pub fn new(
@@ -111,13 +111,13 @@ impl Conversion {
     }
 }
 
-impl PartialEq for Conversion {
+impl PartialEq for RowConversion {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 }
 
-impl fmt::Debug for Conversion {
+impl fmt::Debug for RowConversion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Conversion")
     }
@@ -143,7 +143,7 @@ pub struct Layout {
     /// What positions and torques are.
     pub channels: DeclaredChannels,
     /// Applied to every row.
-    pub conversion: Option<Conversion>,
+    pub conversion: Option<RowConversion>,
     /// A torque holds from its row, or from its message, to the next; else it is interpolated where
     /// messages of an own topic have it.
     pub zero_order_hold: bool,

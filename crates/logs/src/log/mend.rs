@@ -7,13 +7,13 @@ use super::even::EvenSpacing;
 
 /// Follows one position that begins anew after its range, through its turns.
 #[derive(Debug)]
-pub(crate) struct Unwrap {
+pub(crate) struct PositionUnwrap {
     range: f64,
     last: Option<f64>,
     turns: f64,
 }
 
-impl Unwrap {
+impl PositionUnwrap {
     /// For a range in the unit of the position; finite and more than 0.
     pub(crate) fn new(range: f64) -> Self {
         Self {
@@ -39,7 +39,7 @@ impl Unwrap {
 
 /// A number that is put in the place of a logged one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bridge {
+pub struct BridgedSample {
     /// Time of its row [s].
     pub t: f64,
     /// Channel: the positions in joint order, then the torques.
@@ -50,7 +50,7 @@ pub struct Bridge {
 
 /// What is mended while a log is read.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Mending {
+pub struct MendingSettings {
     /// Range of each position that begins anew [m or rad], where the robot file names none.
     pub wraps: Vec<Option<f64>>,
     /// Rows for which each sample was held: only fresh ones are handed out.
@@ -60,20 +60,20 @@ pub struct Mending {
     /// Whether rows that repeat others in the middle of a motion stay.
     pub keep_repeats: bool,
     /// Numbers to replace, in the order of time.
-    pub bridges: Arc<[Bridge]>,
+    pub bridges: Arc<[BridgedSample]>,
     /// Times of rows that were not read and are left out, in order [s].
     pub failed: Arc<[f64]>,
 }
 
 /// Leaves out rows by their times, row after row.
 #[derive(Debug, Default)]
-pub(super) struct Failed {
+pub(super) struct RowRemover {
     all: Arc<[f64]>,
     next: usize,
     pub(super) dropped: u64,
 }
 
-impl Failed {
+impl RowRemover {
     pub(super) fn new(all: Arc<[f64]>) -> Self {
         Self {
             all,
@@ -102,7 +102,7 @@ pub(crate) fn longest_hold(mean: f64, each: impl Iterator<Item = usize>) -> usiz
 
 /// Finds rows that repeat the one before, in a log that holds its samples.
 #[derive(Debug, Default)]
-pub(super) struct Held {
+pub(super) struct HeldRowFilter {
     /// Rows for which a sample is held; 0 where none is.
     rows: usize,
     /// Positions, torques and velocities of the last fresh row.
@@ -112,7 +112,7 @@ pub(super) struct Held {
     pub(super) dropped: u64,
 }
 
-impl Held {
+impl HeldRowFilter {
     pub(super) fn new(rows: Option<usize>) -> Self {
         Self {
             rows: rows.unwrap_or(0),
@@ -147,13 +147,13 @@ impl Held {
 
 /// Puts numbers in the place of others, row after row.
 #[derive(Debug, Default)]
-pub(super) struct Bridging {
-    all: Arc<[Bridge]>,
+pub(super) struct BridgeInserter {
+    all: Arc<[BridgedSample]>,
     next: usize,
 }
 
-impl Bridging {
-    pub(super) fn new(all: Arc<[Bridge]>) -> Self {
+impl BridgeInserter {
+    pub(super) fn new(all: Arc<[BridgedSample]>) -> Self {
         Self { all, next: 0 }
     }
 
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn a_position_is_followed_through_its_turns_in_both_directions() {
         let range = 360.0;
-        let mut unwrap = Unwrap::new(range);
+        let mut unwrap = PositionUnwrap::new(range);
         for k in 0..4000 {
             let q = 900.0 * (f64::from(k) * 0.003).sin();
             let logged = (q + 180.0).rem_euclid(range) - 180.0;
@@ -197,20 +197,20 @@ mod tests {
     #[test]
     fn of_held_samples_the_fresh_one_is_kept_and_at_rest_one_in_so_many_rows() {
         let rows = [1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3, 4].map(f64::from);
-        let mut held = Held::new(Some(3));
+        let mut held = HeldRowFilter::new(Some(3));
         let fresh: Vec<usize> = (0..rows.len())
             .filter(|k| !held.repeats([&rows[*k..=*k], &[7.0], &[]]))
             .collect();
         assert_eq!((fresh, held.dropped), (vec![0, 3, 6, 9, 12], 8));
-        let mut none = Held::new(None);
+        let mut none = HeldRowFilter::new(None);
         assert!(rows.iter().all(|x| !none.repeats([&[*x], &[], &[]])));
     }
 
     #[test]
     fn numbers_are_replaced_at_their_rows_and_nowhere_else() {
         let all = [(0.0, 0, 5.0), (0.2, 1, 6.0), (0.2, 2, 7.0)];
-        let all = all.map(|(t, channel, value)| Bridge { t, channel, value });
-        let mut bridging = Bridging::new(all.into());
+        let all = all.map(|(t, channel, value)| BridgedSample { t, channel, value });
+        let mut bridging = BridgeInserter::new(all.into());
         let as_logged = [1.0, 2.0, 3.0];
         for (t, expected) in [(0.1, as_logged), (0.2, [1.0, 6.0, 7.0]), (0.3, as_logged)] {
             let (mut q, mut tau) = ([1.0, 2.0], [3.0]);

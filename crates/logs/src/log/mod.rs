@@ -5,7 +5,7 @@
 //! grow with the log. What comes out is finite, in strictly increasing time, and in SI.
 //!
 //! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are distinguished
-//! by their first bytes; logs in memory, as [`Arrays`], are read alike.
+//! by their first bytes; logs in memory, as [`LogArrays`], are read alike.
 
 mod arrays;
 mod columns;
@@ -39,25 +39,26 @@ mod time_unit;
 mod two_clocks;
 mod unit;
 
-pub use arrays::Arrays;
+pub use arrays::LogArrays;
 pub use cft_ident_core::block::Block;
 pub use content::{DOCUMENT, REDUCED};
 pub use error::LogError;
 pub use even::EvenSpacing;
-pub use layout::{Channel, Conversion, DeclaredChannels, Layout};
-pub use mend::{Bridge, Mending};
+pub use layout::{Channel, DeclaredChannels, Layout, RowConversion};
+pub use mend::{BridgedSample, MendingSettings};
 pub use names::{escape, escape_whole, nearest};
 pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
 pub use recording::{CdrReader, StateGroup, TopicFacts, Value};
 pub use section::{
-    ActuatorChannels, ChannelChoice, ColumnName, ControllerGains, ControllerTorque, Delimiter,
-    JointChannels, LogSection, RowFault, Stamp, TimeUnit, TorqueIs, TorqueSign,
+    ActuatorChannels, ChannelChoice, ColumnDelimiter, ColumnName, ControllerGains,
+    ControllerTorque, JointChannels, LogSection, RowFault, StampSource, TimeUnit, TorqueIs,
+    TorqueSign,
 };
 pub use shared::shares_rows;
 pub use source::{DataRole, Provenance, begins_with, sha256};
 pub use spec::{LogSpec, Span};
-pub use temperatures::Temperatures;
+pub use temperatures::JointTemperatures;
 pub use time::Instant;
 pub use unit::{PositionUnit, TorqueUnit};
 
@@ -66,7 +67,7 @@ pub use columns::unit_of;
 pub use content::unpacked;
 pub(crate) use even::{EvenClock, EvenFit};
 pub use layout::channel;
-pub(crate) use mend::{Unwrap, longest_hold};
+pub(crate) use mend::{PositionUnwrap, longest_hold};
 pub use names::{did_you_mean, is_hidden, list};
 pub(crate) use pass::round_within;
 pub(crate) use recording::{DelayEstimate, DelayEstimator};

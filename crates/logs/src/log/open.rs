@@ -4,37 +4,38 @@ use std::path::PathBuf;
 
 use super::LogError;
 use super::columns::choose;
-use super::content::Content;
+use super::content::FileContent;
 use super::delayed::DelayedRows;
 use super::layout::Layout;
 use super::recording::{
     JoinedTopics, JointStates, MessageRows, format_of, has_none, of_joints, of_topics,
 };
-use super::rows::{LogRows, Strictness};
-use super::stream::Hashed;
+use super::rows::{LogRows, RowStrictness};
+use super::stream::HashedReader;
 use super::table;
 use super::text::TextRows;
 
-pub(super) struct Opened {
+/// The rows of a log that was opened, and what became known of it.
+pub(super) struct OpenedRows {
     pub(super) rows: Box<dyn LogRows>,
     /// The layout that it turns out to have.
     pub(super) layout: Layout,
     /// What keeps a strict reader from it.
     pub(super) refused: Option<LogError>,
     /// The bytes of a text log.
-    pub(super) bytes: Option<Hashed>,
+    pub(super) bytes: Option<HashedReader>,
 }
 
 /// Opens files as one log of whatever format they have.
 pub(super) fn open(
     files: &[PathBuf],
     layout: &Layout,
-    strictness: Strictness,
-) -> Result<Opened, LogError> {
+    strictness: RowStrictness,
+) -> Result<OpenedRows, LogError> {
     let mut opened = opened(files, layout, strictness)?;
     let torques = !opened.layout.joints.is_empty() && !opened.layout.torques.is_empty();
     if let Some(delay_s) = layout.section.torque_delay_s
-        && strictness == Strictness::Refuse
+        && strictness == RowStrictness::Refuse
         && torques
         && !opened.rows.takes_delay()
     {
@@ -44,15 +45,19 @@ pub(super) fn open(
     Ok(opened)
 }
 
-fn opened(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Opened, LogError> {
+fn opened(
+    files: &[PathBuf],
+    layout: &Layout,
+    strictness: RowStrictness,
+) -> Result<OpenedRows, LogError> {
     if let [path, more @ ..] = files
         && (more.is_empty() || table::begins(path))
     {
-        let content = Content::open_with(path, more)?;
+        let content = FileContent::open_with(path, more)?;
         if format_of(content.head()).is_none() {
             let bytes = content.raw.clone();
             let (rows, layout, refused) = TextRows::open(path, content, layout, strictness)?;
-            return Ok(Opened {
+            return Ok(OpenedRows {
                 rows: Box::new(rows),
                 layout,
                 refused,
@@ -60,7 +65,7 @@ fn opened(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<
             });
         }
     }
-    let recorded = |rows, layout, refused| Opened {
+    let recorded = |rows, layout, refused| OpenedRows {
         rows,
         layout,
         refused,
@@ -81,8 +86,8 @@ fn opened(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<
             return Ok(recorded(Box::new(rows), layout, None));
         }
         match strictness {
-            Strictness::Refuse => return Err(error),
-            Strictness::Record => refused = Some(error),
+            RowStrictness::Refuse => return Err(error),
+            RowStrictness::Record => refused = Some(error),
         }
     }
     match JointStates::open(files, layout.section.topic.as_deref()) {

@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::columns::{time_of, unit_of};
-use super::content::Content;
+use super::content::FileContent;
 use super::even::{DeclaredEven, EvenClock};
 use super::layout::Layout;
 use super::open::open;
-use super::rows::{LogRows, Strictness, counted};
+use super::rows::{LogRows, RowStrictness, counted};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
-use super::stream::Hashed;
-use super::tape::{Tape, TapeRows};
+use super::stream::HashedReader;
+use super::tape::{RowTape, TapeRows};
 use super::text::{JsonRows, TextRows};
 use super::time::Instant;
 use super::two_clocks::rest_of;
@@ -27,7 +27,7 @@ const MAX_STEPS_FROM_ZERO: f64 = 10.0;
 pub(super) struct LogPass {
     pub(super) spec: LogSpec,
     pub(super) files: Vec<PathBuf>,
-    strictness: Strictness,
+    strictness: RowStrictness,
     pub(super) rows: Box<dyn LogRows>,
     /// The layout that the log turned out to have.
     pub(super) layout: Layout,
@@ -49,9 +49,9 @@ pub(super) struct LogPass {
     /// Whether a row was read, and those at the beginning that have no time yet and are left out.
     begun: bool,
     unstamped: u64,
-    watch: Option<Hashed>,
+    watch: Option<HashedReader>,
     /// What is kept of its rows, where it is read strictly.
-    tape: Option<Arc<Tape>>,
+    tape: Option<Arc<RowTape>>,
 }
 
 impl fmt::Debug for LogPass {
@@ -64,11 +64,11 @@ impl LogPass {
     pub(super) fn open(
         spec: &LogSpec,
         layout: &Layout,
-        strictness: Strictness,
+        strictness: RowStrictness,
     ) -> Result<Self, LogError> {
         let files = spec.files()?;
         let mut pass = match (strictness, layout.joints.is_empty()) {
-            (Strictness::Refuse, false) => {
+            (RowStrictness::Refuse, false) => {
                 let tape = spec.kept.tape(&files, layout)?;
                 let found = tape.found.clone().converted_as(layout);
                 let rows = Box::new(TapeRows::new(Arc::clone(&tape)));
@@ -121,7 +121,7 @@ impl LogPass {
         if stated || self.rows.is_recording() {
             return Ok(());
         }
-        let kept = |tape: &Arc<Tape>| tape.first_times(column, UNIT_ROWS);
+        let kept = |tape: &Arc<RowTape>| tape.first_times(column, UNIT_ROWS);
         let times = match self.tape.as_ref().and_then(kept) {
             Some(times) => Some(times),
             None => self.first_numbers(column)?,
@@ -140,7 +140,7 @@ impl LogPass {
 
     /// The first numbers of a column; none where it holds dates, which have no unit.
     fn first_numbers(&self, column: usize) -> Result<Option<Vec<f64>>, LogError> {
-        let mut rows = open(&self.files, &self.layout, Strictness::Record)?.rows;
+        let mut rows = open(&self.files, &self.layout, RowStrictness::Record)?.rows;
         let mut numbers = Vec::with_capacity(UNIT_ROWS);
         while numbers.len() < UNIT_ROWS && rows.next()?.is_some() {
             match rows.logged(column) {
@@ -177,7 +177,7 @@ impl LogPass {
         Self {
             spec,
             files: Vec::new(),
-            strictness: Strictness::Refuse,
+            strictness: RowStrictness::Refuse,
             rows,
             layout,
             refused: None,
@@ -202,14 +202,14 @@ impl LogPass {
         layout: &Layout,
     ) -> Result<Self, LogError> {
         let path = std::path::Path::new(name);
-        let content = Content::of_stream(path, stream)?;
+        let content = FileContent::of_stream(path, stream)?;
         let watch = content.watch.clone();
         let is_json = content.head().trim_ascii_start().starts_with(b"{");
         let (rows, layout): (Box<dyn LogRows>, Layout) = if is_json {
             let (rows, layout) = JsonRows::open(path, content, layout)?;
             (Box::new(rows), layout)
         } else {
-            let (rows, layout, _) = TextRows::open(path, content, layout, Strictness::Refuse)?;
+            let (rows, layout, _) = TextRows::open(path, content, layout, RowStrictness::Refuse)?;
             (Box::new(rows), layout)
         };
         Ok(Self {

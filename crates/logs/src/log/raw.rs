@@ -4,11 +4,11 @@
 use std::path::PathBuf;
 
 use super::columns::{time_of, unit_of};
-use super::content::Content;
+use super::content::FileContent;
 use super::layout::{Channel, Layout};
 use super::pass::LogPass;
 use super::recording::{self, StateGroup, TopicFacts, format_of, state_groups};
-use super::rows::{Strictness, counted};
+use super::rows::{RowStrictness, counted};
 use super::source::Provenance;
 use super::time::Instant;
 use super::two_clocks::rest_of;
@@ -32,7 +32,7 @@ fn of_recording<T>(
 ) -> Result<Vec<T>, LogError> {
     let files = spec.files()?;
     for file in &files {
-        let content = Content::open(file)?;
+        let content = FileContent::open(file)?;
         if format_of(content.head()).is_some() && !content.table {
             return look(&files);
         }
@@ -99,7 +99,7 @@ impl RawReader {
         let Some(layout) = layout else {
             return Self::open_plain(spec, &LogSection::default());
         };
-        let pass = LogPass::open(spec, layout, Strictness::Record)?;
+        let pass = LogPass::open(spec, layout, RowStrictness::Record)?;
         let words = vec![0; pass.rows.names().len()];
         Ok(Self {
             pass,

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::arrays::{ArrayRows, Arrays};
+use super::arrays::{ArrayRows, LogArrays};
 use super::even::EvenClock;
 use super::layout::{Channel, Layout};
-use super::mend::{Bridging, Failed, Held, Mending, Unwrap};
+use super::mend::{BridgeInserter, HeldRowFilter, MendingSettings, PositionUnwrap, RowRemover};
 use super::pass::LogPass;
-use super::rows::{Strictness, counted};
+use super::rows::{RowStrictness, counted};
 use super::source::{self, Provenance};
-use super::stale::Stale;
+use super::stale::StaleDetector;
 use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
 use cft_ident_core::number::significant;
@@ -21,13 +21,13 @@ pub struct Reader {
     /// Times of the first and the last row of the file so far [s].
     seen: Option<(f64, f64)>,
     finished: bool,
-    activity: Vec<Activity>,
-    stale: Stale,
+    activity: Vec<JointActivity>,
+    stale: StaleDetector,
     /// Positions that are followed through their turns, by their places.
-    turning: Vec<(usize, Unwrap)>,
-    held: Held,
-    bridging: Bridging,
-    failed: Failed,
+    turning: Vec<(usize, PositionUnwrap)>,
+    held: HeldRowFilter,
+    bridging: BridgeInserter,
+    failed: RowRemover,
     even: Option<EvenClock>,
     /// Messages that repeat the one before them in everything.
     duplicates: u64,
@@ -35,8 +35,9 @@ pub struct Reader {
     pending: Block,
 }
 
+/// What a joint has done so far: its first position, whether it moved, and whether it was driven.
 #[derive(Debug, Clone, Copy, Default)]
-struct Activity {
+struct JointActivity {
     first_position: Option<f64>,
     moved: bool,
     driven: bool,
@@ -48,14 +49,14 @@ impl Reader {
     /// # Errors
     /// A file that cannot be read, is no log, or lacks a channel of the layout.
     pub fn open(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        LogPass::open(spec, layout, Strictness::Refuse).map(Self::new)
+        LogPass::open(spec, layout, RowStrictness::Refuse).map(Self::new)
     }
 
     /// Reads a log that is in memory; `layout` names its joints and says whether torques are read.
     ///
     /// # Errors
     /// Another number of channels than the layout has.
-    pub fn of_arrays(arrays: &Arc<Arrays>, layout: Layout) -> Result<Self, LogError> {
+    pub fn of_arrays(arrays: &Arc<LogArrays>, layout: Layout) -> Result<Self, LogError> {
         let rows = Box::new(ArrayRows::open(arrays, &layout)?);
         let spec = LogSpec::whole(arrays.name());
         Ok(Self::new(LogPass::of_rows(spec, rows, layout)))
@@ -91,33 +92,33 @@ impl Reader {
             pass,
             seen: None,
             finished: false,
-            activity: vec![Activity::default(); torques.min(joints)],
-            stale: Stale::new(joints),
+            activity: vec![JointActivity::default(); torques.min(joints)],
+            stale: StaleDetector::new(joints),
             turning: Vec::new(),
-            held: Held::default(),
-            bridging: Bridging::default(),
-            failed: Failed::default(),
+            held: HeldRowFilter::default(),
+            bridging: BridgeInserter::default(),
+            failed: RowRemover::default(),
             even: None,
             duplicates: 0,
             pending: Block::default(),
         };
-        reader.mend(&Mending::default());
+        reader.mend(&MendingSettings::default());
         reader
     }
 
     /// Says what to mend, before the first row is read; positions whose range the layout names are
     /// followed through their turns in any case.
-    pub fn mend(&mut self, mending: &Mending) {
+    pub fn mend(&mut self, mending: &MendingSettings) {
         let positions = self.pass.layout.positions.iter().enumerate();
         let turning = |(place, channel): (usize, &Channel)| {
             let found = mending.wraps.get(place).copied().flatten();
-            Some((place, Unwrap::new(channel.wrap.or(found)?)))
+            Some((place, PositionUnwrap::new(channel.wrap.or(found)?)))
         };
         self.turning = positions.filter_map(turning).collect();
-        self.held = Held::new(mending.held);
+        self.held = HeldRowFilter::new(mending.held);
         self.even = mending.even.map(EvenClock::new);
-        self.bridging = Bridging::new(Arc::clone(&mending.bridges));
-        self.failed = Failed::new(Arc::clone(&mending.failed));
+        self.bridging = BridgeInserter::new(Arc::clone(&mending.bridges));
+        self.failed = RowRemover::new(Arc::clone(&mending.failed));
         self.stale.keep = mending.keep_repeats;
     }
 

@@ -1,6 +1,6 @@
 //! What every log is made of, whatever the format of its files: rows, one after the other.
 
-use super::time::Stamped;
+use super::time::RowTime;
 use super::{Block, LogError};
 
 /// A sentence that begins with a number, where that is not 0.
@@ -10,7 +10,7 @@ pub(super) fn counted(count: u64, text: &str) -> Option<String> {
 
 /// What becomes of a row, a field or a channel that cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Strictness {
+pub(super) enum RowStrictness {
     /// The log is refused, with the line.
     Refuse,
     /// It is recorded as a fault of the log, and reading goes on.
@@ -29,7 +29,7 @@ pub(super) trait LogRows: Send {
     }
 
     /// Goes on to the next row; its time, or `None` at the end.
-    fn next(&mut self) -> Result<Option<Stamped>, LogError>;
+    fn next(&mut self) -> Result<Option<RowTime>, LogError>;
 
     /// The number in a column of the current row as logged, NaN where there is none; `None` for words.
     fn logged(&self, _column: usize) -> Option<f64> {

@@ -92,7 +92,8 @@ pub enum RowFault {
 /// What parts the columns of a text log.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Delimiter {
+#[schemars(rename = "Delimiter")]
+pub enum ColumnDelimiter {
     /// Found from the header line.
     #[default]
     Auto,
@@ -122,7 +123,8 @@ pub enum ChannelChoice {
 /// Which time of a message is the time of its row.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Stamp {
+#[schemars(rename = "Stamp")]
+pub enum StampSource {
     /// The field that `time` names, else the header's stamp, else the time of recording.
     #[default]
     Auto,
@@ -286,7 +288,7 @@ pub struct LogSection {
     pub keep: Vec<RowFault>,
     /// What parts the columns.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub delimiter: Delimiter,
+    pub delimiter: ColumnDelimiter,
     /// Line of a text log that names its columns, from 1; found where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub header_line: Option<u64>,
@@ -301,7 +303,7 @@ pub struct LogSection {
     pub temperature_topic: Option<String>,
     /// Which time of a message counts.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub stamp: Stamp,
+    pub stamp: StampSource,
     /// Time by which torques lag behind the positions [s]; it is taken off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_delay_s: Option<f64>,

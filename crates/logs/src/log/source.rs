@@ -187,7 +187,7 @@ pub fn sha256(path: &Path) -> Result<String, LogError> {
 
 /// SHA-256 of bytes, hexadecimal.
 pub fn sha256_of_bytes(bytes: &[u8]) -> String {
-    let mut checksum = Checksum::default();
+    let mut checksum = SourceChecksum::default();
     checksum.update(bytes);
     checksum.hexadecimal()
 }
@@ -202,7 +202,7 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, LogError> {
 
 /// SHA-256 of whole files one after the other, hexadecimal.
 pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
-    let mut checksum = Checksum::default();
+    let mut checksum = SourceChecksum::default();
     for path in paths {
         let mut file = BufReader::with_capacity(1 << 16, open(path)?);
         let read = io::copy(&mut file, &mut checksum.0);
@@ -211,10 +211,11 @@ pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
     Ok(checksum.hexadecimal())
 }
 
+/// SHA-256 of the bytes of a log, as they are read.
 #[derive(Clone, Default)]
-pub(super) struct Checksum(Sha256);
+pub(super) struct SourceChecksum(Sha256);
 
-impl Checksum {
+impl SourceChecksum {
     pub(super) fn update(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
     }

@@ -11,7 +11,7 @@ use super::names::escape_whole;
 use super::recording::FORMATS;
 use super::source::{self, failed, file_name, shown};
 use super::table::dataset;
-use super::tape::Kept;
+use super::tape::KeptTapes;
 
 /// The part of a log that is used.
 ///
@@ -123,7 +123,7 @@ pub struct LogSpec {
     /// How long the machine had run when the log began \[s\].
     pub started_s: f64,
     /// What is kept of it, so that it is read once.
-    pub(super) kept: Arc<Kept>,
+    pub(super) kept: Arc<KeptTapes>,
 }
 
 impl PartialEq for LogSpec {
@@ -148,7 +148,7 @@ impl LogSpec {
     }
 
     fn new(path: PathBuf, span: Span) -> Self {
-        let kept = Kept::of(&path);
+        let kept = KeptTapes::of(&path);
         Self {
             path,
             span,

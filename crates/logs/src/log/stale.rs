@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// The motion right before the current row.
 #[derive(Debug, Default)]
-pub(super) struct Stale {
+pub(super) struct StaleDetector {
     /// Time and positions of the last row that moved.
     t: Option<f64>,
     q: Vec<f64>,
@@ -46,7 +46,7 @@ pub(super) struct Stale {
     held: [u64; MAX_STALE_ROWS + 1],
 }
 
-impl Stale {
+impl StaleDetector {
     pub(super) fn new(joints: usize) -> Self {
         Self {
             q: vec![0.0; joints],
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     fn dropped(rows: &[f64]) -> Vec<usize> {
-        let mut stale = Stale::new(1);
+        let mut stale = StaleDetector::new(1);
         let rows = rows.iter().enumerate();
         rows.filter_map(|(i, q)| match stale.judge(i as f64, &[*q], || true) {
             0 => None,

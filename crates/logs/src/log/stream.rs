@@ -5,25 +5,26 @@ use std::io::{self, Read};
 use std::sync::{Arc, Mutex};
 
 use super::held_files::lock;
-use super::source::Checksum;
+use super::source::SourceChecksum;
 
 /// A reader; its copies go on where another one has come to.
 #[derive(Clone)]
-pub(super) struct Hashed(Arc<Mutex<Inner>>);
+pub(super) struct HashedReader(Arc<Mutex<StreamState>>);
 
-struct Inner {
+/// The bytes of a stream, with their checksum.
+struct StreamState {
     from: Box<dyn Read + Send>,
-    checksum: Checksum,
+    checksum: SourceChecksum,
     bytes: u64,
     last: Option<u8>,
     ended: bool,
 }
 
-impl Hashed {
+impl HashedReader {
     pub(super) fn new(from: impl Read + Send + 'static) -> Self {
-        Self(Arc::new(Mutex::new(Inner {
+        Self(Arc::new(Mutex::new(StreamState {
             from: Box::new(from),
-            checksum: Checksum::default(),
+            checksum: SourceChecksum::default(),
             bytes: 0,
             last: None,
             ended: false,
@@ -49,7 +50,7 @@ impl Hashed {
     }
 }
 
-impl Read for Hashed {
+impl Read for HashedReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let inner = &mut *lock(&self.0);
         let count = loop {

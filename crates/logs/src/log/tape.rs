@@ -12,38 +12,38 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, Weak};
 use std::time::SystemTime;
 
-use self::chunk::{Chunk, NUMBERS, ROW_BYTES, ROWS};
+use self::chunk::{NUMBERS, ROW_BYTES, ROWS, RowChunk};
 use super::columns::position_of;
 use super::held_files::{HeldFiles, lock};
 use super::layout::Layout;
-use super::open::{Opened, open};
-use super::rows::{LogRows, Strictness};
+use super::open::{OpenedRows, open};
+use super::rows::{LogRows, RowStrictness};
 use super::source;
-use super::stream::Hashed;
-use super::time::Stamped;
+use super::stream::HashedReader;
+use super::time::RowTime;
 use super::{Block, LogError};
 
 /// Bytes of a log that are kept in memory.
 const IN_MEMORY: usize = 1 << 20;
 
 /// What is kept of a log while somebody holds its [`super::LogSpec`].
-pub(super) struct Kept {
+pub(super) struct KeptTapes {
     path: PathBuf,
     /// Held, so that its files stay open.
     _files: Arc<HeldFiles>,
-    tapes: Mutex<Vec<(Layout, Arc<Tape>)>>,
+    tapes: Mutex<Vec<(Layout, Arc<RowTape>)>>,
 }
 
-impl fmt::Debug for Kept {
+impl fmt::Debug for KeptTapes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Kept")
     }
 }
 
 /// What is kept of logs that somebody holds now.
-static HELD: Mutex<Vec<Weak<Kept>>> = Mutex::new(Vec::new());
+static HELD: Mutex<Vec<Weak<KeptTapes>>> = Mutex::new(Vec::new());
 
-impl Kept {
+impl KeptTapes {
     /// What is kept of the log of this path: all who hold it share its rows, whatever their spans.
     pub(super) fn of(path: &Path) -> Arc<Self> {
         let mut held = lock(&HELD);
@@ -62,7 +62,11 @@ impl Kept {
     }
 
     /// The tape of these files by this layout, its conversion aside; what the log turned out to be.
-    pub(super) fn tape(&self, files: &[PathBuf], layout: &Layout) -> Result<Arc<Tape>, LogError> {
+    pub(super) fn tape(
+        &self,
+        files: &[PathBuf],
+        layout: &Layout,
+    ) -> Result<Arc<RowTape>, LogError> {
         let layout = layout.clone().as_logged();
         let state = states(files);
         let mut tapes = lock(&self.tapes);
@@ -70,16 +74,16 @@ impl Kept {
         if let Some((_, tape)) = tapes.iter().find(|(of, _)| *of == layout) {
             return Ok(Arc::clone(tape));
         }
-        let tape = Arc::new(Tape::open(files, &layout, state)?);
+        let tape = Arc::new(RowTape::open(files, &layout, state)?);
         tapes.push((layout, Arc::clone(&tape)));
         Ok(tape)
     }
 }
 
 /// Length and last change of each file: a file that was written anew is read anew.
-type States = Vec<Option<(u64, SystemTime)>>;
+type FileStates = Vec<Option<(u64, SystemTime)>>;
 
-fn states(files: &[PathBuf]) -> States {
+fn states(files: &[PathBuf]) -> FileStates {
     let state = |file: &PathBuf| {
         let about = file.metadata().ok()?;
         Some((about.len(), about.modified().ok()?))
@@ -88,10 +92,10 @@ fn states(files: &[PathBuf]) -> States {
 }
 
 /// Rows that are kept, whose source hands out more.
-pub(super) struct Tape {
+pub(super) struct RowTape {
     files: Vec<PathBuf>,
     layout: Layout,
-    state: States,
+    state: FileStates,
     /// The layout that the log turned out to have.
     pub(super) found: Layout,
     names: Vec<String>,
@@ -99,17 +103,17 @@ pub(super) struct Tape {
     widths: [usize; 3],
     /// The column of times, where its numbers are taken as seconds.
     time_column: Option<usize>,
-    inner: Mutex<Inner>,
+    inner: Mutex<TapeState>,
     /// The first times, as they were read before their unit was known.
     first: OnceLock<Option<Vec<f64>>>,
     sha256: OnceLock<String>,
 }
 
-struct Inner {
+struct TapeState {
     source: Box<dyn LogRows>,
-    bytes: Option<Hashed>,
+    bytes: Option<HashedReader>,
     time: Option<(usize, f64)>,
-    chunks: Vec<Place>,
+    chunks: Vec<ChunkPlace>,
     /// Bytes of the chunks that are in memory.
     size: usize,
     spilled: Option<File>,
@@ -119,20 +123,21 @@ struct Inner {
     error: Option<LogError>,
 }
 
-enum Place {
-    Memory(Arc<Chunk>),
+/// Where a chunk of rows is kept.
+enum ChunkPlace {
+    Memory(Arc<RowChunk>),
     /// At this byte of the temporary file, with so many rows.
     File(u64, usize),
 }
 
-impl Tape {
-    fn open(files: &[PathBuf], layout: &Layout, state: States) -> Result<Self, LogError> {
-        let Opened {
+impl RowTape {
+    fn open(files: &[PathBuf], layout: &Layout, state: FileStates) -> Result<Self, LogError> {
+        let OpenedRows {
             rows,
             layout: found,
             bytes,
             ..
-        } = open(files, layout, Strictness::Refuse)?;
+        } = open(files, layout, RowStrictness::Refuse)?;
         let plain = found.time.factor == 1.0 && found.section.rate_hz.is_none();
         let time = || position_of(rows.names(), &found.time);
         let dq = usize::from(rows.has_velocities()) * found.velocities.len();
@@ -146,20 +151,20 @@ impl Tape {
             found,
             first: OnceLock::new(),
             sha256: OnceLock::new(),
-            inner: Mutex::new(Inner::new(rows, bytes)),
+            inner: Mutex::new(TapeState::new(rows, bytes)),
         })
     }
 
     /// The chunk of this number; `None` behind the last one.
-    fn chunk(&self, index: usize) -> Result<Option<Arc<Chunk>>, LogError> {
+    fn chunk(&self, index: usize) -> Result<Option<Arc<RowChunk>>, LogError> {
         let mut inner = lock(&self.inner);
         while index >= inner.chunks.len() && !inner.ended {
             let chunk = inner.produce(self.widths);
             inner.keep(chunk).map_err(|error| self.no_room(error))?;
         }
         match inner.chunks.get(index) {
-            Some(Place::Memory(chunk)) => Ok(Some(Arc::clone(chunk))),
-            Some(Place::File(at, rows)) => {
+            Some(ChunkPlace::Memory(chunk)) => Ok(Some(Arc::clone(chunk))),
+            Some(ChunkPlace::File(at, rows)) => {
                 let (at, rows) = (*at, *rows);
                 let width = self.widths.iter().sum();
                 let read = inner.restored(at, rows, width);
@@ -178,7 +183,7 @@ impl Tape {
     }
 
     /// Goes to the end of the log, or to what ends it.
-    fn to_the_end(&self) -> MutexGuard<'_, Inner> {
+    fn to_the_end(&self) -> MutexGuard<'_, TapeState> {
         loop {
             let mut inner = lock(&self.inner);
             if inner.ended {
@@ -193,7 +198,8 @@ impl Tape {
 
     /// The rows anew from the files, the first `rows` of them passed: for what a tape does not keep.
     fn fresh_at(&self, rows: usize) -> Result<Box<dyn LogRows>, LogError> {
-        let Opened { rows: mut anew, .. } = open(&self.files, &self.layout, Strictness::Refuse)?;
+        let OpenedRows { rows: mut anew, .. } =
+            open(&self.files, &self.layout, RowStrictness::Refuse)?;
         if let Some((column, seconds)) = lock(&self.inner).time {
             anew.set_time(column, seconds);
         }
@@ -218,8 +224,8 @@ impl Tape {
         }
         let first = || {
             let chunk = self.chunk(0).ok()??;
-            let number = |stamp: &Stamped| match stamp {
-                Stamped::Seconds(t) if !t.is_nan() => Some(*t),
+            let number = |stamp: &RowTime| match stamp {
+                RowTime::Seconds(t) if !t.is_nan() => Some(*t),
                 _ => None,
             };
             let whole = chunk.stamps.len() >= most.min(ROWS) || !lock(&self.inner).failed;
@@ -238,12 +244,12 @@ impl Tape {
             return;
         }
         if !inner.chunks.is_empty() || inner.ended {
-            match open(&self.files, &self.layout, Strictness::Refuse) {
+            match open(&self.files, &self.layout, RowStrictness::Refuse) {
                 Ok(opened) => {
-                    *inner = Inner {
+                    *inner = TapeState {
                         time: inner.time,
                         spilled: inner.spilled.take(),
-                        ..Inner::new(opened.rows, opened.bytes)
+                        ..TapeState::new(opened.rows, opened.bytes)
                     };
                 }
                 Err(error) => {
@@ -269,8 +275,8 @@ impl Tape {
     }
 }
 
-impl Inner {
-    fn new(source: Box<dyn LogRows>, bytes: Option<Hashed>) -> Self {
+impl TapeState {
+    fn new(source: Box<dyn LogRows>, bytes: Option<HashedReader>) -> Self {
         Self {
             source,
             bytes,
@@ -289,16 +295,16 @@ impl Inner {
     }
 
     fn rows(&self) -> usize {
-        let rows = |place: &Place| match place {
-            Place::Memory(chunk) => chunk.stamps.len(),
-            Place::File(_, rows) => *rows,
+        let rows = |place: &ChunkPlace| match place {
+            ChunkPlace::Memory(chunk) => chunk.stamps.len(),
+            ChunkPlace::File(_, rows) => *rows,
         };
         self.chunks.iter().map(rows).sum()
     }
 
-    fn produce(&mut self, widths: [usize; 3]) -> Chunk {
+    fn produce(&mut self, widths: [usize; 3]) -> RowChunk {
         let width: usize = widths.iter().sum();
-        let mut chunk = Chunk::default();
+        let mut chunk = RowChunk::default();
         let mut row = Block::default();
         while chunk.stamps.len() < ROWS && chunk.values.len() < NUMBERS {
             match self.source.next() {
@@ -326,7 +332,7 @@ impl Inner {
         chunk
     }
 
-    fn keep(&mut self, chunk: Chunk) -> io::Result<()> {
+    fn keep(&mut self, chunk: RowChunk) -> io::Result<()> {
         if chunk.stamps.is_empty() {
             return Ok(());
         }
@@ -337,30 +343,30 @@ impl Inner {
         // where there is no folder for temporary files, memory has to do
         let Some(file) = &mut self.spilled else {
             self.size += bytes;
-            self.chunks.push(Place::Memory(Arc::new(chunk)));
+            self.chunks.push(ChunkPlace::Memory(Arc::new(chunk)));
             return Ok(());
         };
         let at = file.seek(SeekFrom::End(0))?;
         file.write_all(&chunk.written())?;
-        self.chunks.push(Place::File(at, chunk.stamps.len()));
+        self.chunks.push(ChunkPlace::File(at, chunk.stamps.len()));
         Ok(())
     }
 
-    fn restored(&mut self, at: u64, rows: usize, width: usize) -> io::Result<Chunk> {
+    fn restored(&mut self, at: u64, rows: usize, width: usize) -> io::Result<RowChunk> {
         let Some(file) = &mut self.spilled else {
             return Err(io::ErrorKind::NotFound.into());
         };
         let mut bytes = vec![0; rows * (ROW_BYTES + 8 * width)];
         file.seek(SeekFrom::Start(at))?;
         file.read_exact(&mut bytes)?;
-        Ok(Chunk::of(&bytes, width))
+        Ok(RowChunk::of(&bytes, width))
     }
 }
 
 /// One way along a tape.
 pub(super) struct TapeRows {
-    tape: Arc<Tape>,
-    chunk: Arc<Chunk>,
+    tape: Arc<RowTape>,
+    chunk: Arc<RowChunk>,
     /// Number of the next chunk, rows of this one that were begun, rows before it.
     next: usize,
     begun: usize,
@@ -368,7 +374,7 @@ pub(super) struct TapeRows {
 }
 
 impl TapeRows {
-    pub(super) fn new(tape: Arc<Tape>) -> Self {
+    pub(super) fn new(tape: Arc<RowTape>) -> Self {
         Self {
             tape,
             chunk: Arc::default(),
@@ -389,7 +395,7 @@ impl LogRows for TapeRows {
         &self.tape.names
     }
 
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         if self.begun == self.chunk.stamps.len() {
             let Some(chunk) = self.tape.chunk(self.next)? else {
                 return Ok(None);

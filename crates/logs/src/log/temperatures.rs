@@ -3,24 +3,25 @@
 
 use super::layout::Layout;
 use super::pass::LogPass;
-use super::rows::Strictness;
+use super::rows::RowStrictness;
 use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
 
 /// Courses of the temperatures of joints, as they were logged.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Temperatures {
+pub struct JointTemperatures {
     /// Joint, times \[s\] and temperatures \[degC\], the times in order.
-    courses: Vec<(usize, Course)>,
+    courses: Vec<(usize, LoggedTemperature)>,
 }
 
+/// A logged temperature over time: instants \[s\] and values \[degC\].
 #[derive(Debug, Clone, Default, PartialEq)]
-struct Course {
+struct LoggedTemperature {
     t: Vec<f64>,
     value: Vec<f64>,
 }
 
-impl Temperatures {
+impl JointTemperatures {
     /// Reads those that a layout names, of these joints in this order; their times count from `origin`, as those of
     /// the log's blocks do. Rows of the whole file are read, whatever its span.
     ///
@@ -35,8 +36,8 @@ impl Temperatures {
             span: Span::Whole,
             ..spec.clone()
         };
-        let mut pass = LogPass::open(&whole, layout, Strictness::Refuse)?;
-        let mut courses = vec![Course::default(); joints.len()];
+        let mut pass = LogPass::open(&whole, layout, RowStrictness::Refuse)?;
+        let mut courses = vec![LoggedTemperature::default(); joints.len()];
         let mut row = Block::default();
         while let Some(t) = pass.next()? {
             row.clear();
@@ -57,7 +58,7 @@ impl Temperatures {
         columns: impl Iterator<Item = (usize, &'a [f64])>,
     ) -> Self {
         let course = |values: &[f64]| {
-            let mut course = Course::default();
+            let mut course = LoggedTemperature::default();
             t.iter().zip(values).for_each(|(t, x)| course.push(*t, *x));
             course
         };
@@ -69,7 +70,7 @@ impl Temperatures {
     /// The temperature of joint `joint` at time `t` \[s\]: on a straight line between two rows, that of the nearest row
     /// before the first and behind the last; none where it is not known.
     pub fn at(&self, joint: usize, t: f64) -> Option<f64> {
-        let of = |(j, course): &(usize, Course)| (*j == joint).then(|| course.at(t));
+        let of = |(j, course): &(usize, LoggedTemperature)| (*j == joint).then(|| course.at(t));
         self.courses.iter().find_map(of).flatten()
     }
 
@@ -83,7 +84,7 @@ impl Temperatures {
     }
 }
 
-impl Course {
+impl LoggedTemperature {
     /// Takes a row that is later than the one before; of rows of one value the first and the last are kept.
     fn push(&mut self, t: f64, value: f64) {
         if self.t.last().is_some_and(|last| t <= *last) {
@@ -117,7 +118,7 @@ mod tests {
     fn between_rows_a_temperature_lies_on_a_line_and_beyond_them_it_stays() {
         let t = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
         let warm = [20.0, 20.0, 20.0, 20.0, 22.0, 21.0];
-        let all = Temperatures::of_columns(&t, [(1, &warm[..])].into_iter());
+        let all = JointTemperatures::of_columns(&t, [(1, &warm[..])].into_iter());
         assert_eq!(all.courses[0].1.t, [0.0, 3.0, 4.0, 5.0]);
         for (t, wanted) in [
             (-1.0, 20.0),
@@ -132,6 +133,6 @@ mod tests {
             assert_eq!(all.at(0, t), None);
         }
         assert_eq!(all.along(&[3.5, 6.0], 2), [vec![], vec![21.0, 21.0]]);
-        assert!(Temperatures::default().along(&t, 2).is_empty());
+        assert!(JointTemperatures::default().along(&t, 2).is_empty());
     }
 }

@@ -161,20 +161,20 @@ fn days_of(date: &str) -> Option<i64> {
 
 /// Time of a row, before it is counted from anywhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Stamped {
+pub(super) enum RowTime {
     /// Seconds as the log counts them.
     Seconds(f64),
     /// An exact instant, counted from the first one where it is far from zero.
     Exact(Instant),
 }
 
-impl Default for Stamped {
+impl Default for RowTime {
     fn default() -> Self {
         Self::Seconds(0.0)
     }
 }
 
-impl Stamped {
+impl RowTime {
     /// Of a row without a time.
     pub(super) const NONE: Self = Self::Seconds(f64::NAN);
 

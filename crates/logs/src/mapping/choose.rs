@@ -4,10 +4,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::column::LogColumn;
-use super::family::{How, temperatures};
-use super::fitting::{Taken, best, external, left, offered, without_common_head};
+use super::family::{ColumnAssignment, temperatures};
+use super::fitting::{FamilyMatch, best, external, left, offered, without_common_head};
 use super::look::{ClockSource, SeenColumns};
-use super::shown::{Known, shown};
+use super::shown::{UrdfJoint, shown};
 use super::units::{of_positions, of_torques, other_velocity, stated_position};
 use crate::inspect::ChannelRole;
 use crate::inspect::words::without_joint;
@@ -86,9 +86,9 @@ const ROLES: [(ChannelRole, &str); 3] = [
 
 impl Mapping {
     /// The columns of the joints of a URDF, or of those that the log shows.
-    pub fn of(known: Option<&[Known]>, seen: Option<&SeenColumns>) -> Self {
+    pub fn of(known: Option<&[UrdfJoint]>, seen: Option<&SeenColumns>) -> Self {
         let columns: &[LogColumn] = seen.map_or(&[], |seen| &seen.columns);
-        let joints = known.map_or_else(|| shown(columns), <[Known]>::to_vec);
+        let joints = known.map_or_else(|| shown(columns), <[UrdfJoint]>::to_vec);
         let names: Vec<&str> = joints.iter().map(|joint| joint.name.as_str()).collect();
         let mut out = Self {
             joints: joints.iter().map(plain).collect(),
@@ -103,7 +103,7 @@ impl Mapping {
         let beside = position.as_ref().map(|taken| taken.pattern.clone());
         let beside = beside.as_deref();
         let velocity = best(columns, ChannelRole::Velocity, false, &names, beside)
-            .filter(|taken| taken.how != How::InPart);
+            .filter(|taken| taken.how != ColumnAssignment::InPart);
         let mut torque = out.measured(columns, 2, &names, beside);
         let one = position.is_some() != torque.is_some();
         if let Some(taken) = left(columns, &names).filter(|_| one) {
@@ -195,7 +195,7 @@ impl Mapping {
         role: usize,
         names: &[&str],
         beside: Option<&str>,
-    ) -> Option<Taken<'a>> {
+    ) -> Option<FamilyMatch<'a>> {
         let (role, what) = ROLES[role];
         best(columns, role, false, names, beside).or_else(|| {
             let taken = best(columns, role, true, names, beside)?;
@@ -211,16 +211,16 @@ impl Mapping {
     }
 
     /// Says how a family was taken.
-    fn note(&mut self, taken: &Taken, what: &str, joints: usize, by_content: bool) {
+    fn note(&mut self, taken: &FamilyMatch, what: &str, joints: usize, by_content: bool) {
         let pattern = escape(&taken.pattern);
         let check = match taken.how {
             _ if by_content => Some("found by what the columns hold".to_owned()),
-            How::Fits => None,
-            How::InOrder => {
+            ColumnAssignment::Fits => None,
+            ColumnAssignment::InOrder => {
                 self.how = "in the order of the columns, for their names say nothing: CHECK IT";
                 Some(format!("{pattern} in the order of the joints"))
             }
-            How::InPart => {
+            ColumnAssignment::InPart => {
                 self.how = "as far as their names fit: CHECK IT";
                 let found = taken.columns.iter().flatten().count();
                 Some(format!(
@@ -239,7 +239,7 @@ impl Mapping {
     }
 
     /// Units of positions and torques; whether velocities are in units that do not go with those of the positions.
-    fn units(&mut self, known: &[Known], [q, dq, tau]: [&[Option<LogColumn>]; 3]) -> bool {
+    fn units(&mut self, known: &[UrdfJoint], [q, dq, tau]: [&[Option<LogColumn>]; 3]) -> bool {
         fn paired(columns: &[Option<LogColumn>]) -> (Vec<usize>, Vec<&LogColumn>) {
             let all = columns.iter().enumerate();
             all.filter_map(|(k, column)| Some((k, column.as_ref()?)))
@@ -331,7 +331,7 @@ impl Mapping {
     }
 }
 
-fn plain(known: &Known) -> JointColumns {
+fn plain(known: &UrdfJoint) -> JointColumns {
     JointColumns {
         joint: known.name.clone(),
         kind: known.kind,

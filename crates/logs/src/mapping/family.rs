@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::column::LogColumn;
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, has, marked, place_of, without_units, words};
+use crate::inspect::words::{NameWord, has, marked, place_of, without_units, words};
 use crate::log::nearest;
 
 /// What distinguishes a member of a family from the others.
@@ -26,7 +26,7 @@ pub(super) struct Family<'a> {
 
 /// How the columns of a family were given to the joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum How {
+pub(super) enum ColumnAssignment {
     /// Each has the joint's name, or the numbers of all are those of the joints, from 0 or from 1.
     Fits,
     /// As many as joints, in their order: the joints have no numbers.
@@ -51,7 +51,7 @@ const PENALTIES: [(&str, i32); 4] = [
     ("act actual meas measured feedback fbk follower sensor", -1),
 ];
 
-pub(super) fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
+pub(super) fn penalty(pattern: &[NameWord], role: ChannelRole) -> i32 {
     let shown = PENALTIES.iter().filter(|(known, _)| has(pattern, known));
     let sum: i32 = shown.map(|(_, count)| *count).sum();
     // `current` beside a position is an adjective
@@ -147,7 +147,7 @@ fn numbers(names: &[&str]) -> Option<Vec<u32>> {
     let of = |last: bool| -> Option<Vec<u32>> {
         let one = |name: &&str| {
             let spoken = words(name);
-            let mut numbers = spoken.iter().filter_map(Word::number);
+            let mut numbers = spoken.iter().filter_map(NameWord::number);
             match last {
                 true => numbers.next_back(),
                 false => numbers.next(),
@@ -202,7 +202,7 @@ fn bare(name: &str) -> String {
 pub(super) fn fit<'a>(
     family: &Family<'a>,
     joints: &[&str],
-) -> Option<(How, Vec<Option<&'a LogColumn>>)> {
+) -> Option<(ColumnAssignment, Vec<Option<&'a LogColumn>>)> {
     let by_key = |key: &Key| {
         let found = family.members.iter().find(|(own, _)| own == key);
         found.map(|(_, column)| *column)
@@ -214,7 +214,7 @@ pub(super) fn fit<'a>(
     });
     let named: Vec<Option<&LogColumn>> = named.collect();
     if named.iter().all(Option::is_some) {
-        return Some((How::Fits, named));
+        return Some((ColumnAssignment::Fits, named));
     }
     let keys = family.members.iter();
     let numbered = keys.filter_map(|(key, _)| match key {
@@ -235,39 +235,42 @@ pub(super) fn fit<'a>(
         let first = in_order.and_then(|sorted| sorted.first().copied());
         let whole = from_start && own.len() == joints.len();
         let of_joint = |at: usize| Some(base + at as u32);
-        let (how, numbers): (How, Vec<Option<u32>>) = match (of_joints, first) {
+        let (how, numbers): (ColumnAssignment, Vec<Option<u32>>) = match (of_joints, first) {
             // the joints have numbers in a row: the first column is the first joint's
             (Some(of), Some(first)) if whole => (
-                How::Fits,
+                ColumnAssignment::Fits,
                 of.iter().map(|n| Some(n - first + base)).collect(),
             ),
             (None, _) if whole => {
                 let how = match joints.len() {
-                    1 => How::Fits,
-                    _ => How::InOrder,
+                    1 => ColumnAssignment::Fits,
+                    _ => ColumnAssignment::InOrder,
                 };
                 (how, (0..joints.len()).map(of_joint).collect())
             }
             // other numbers, or not all: by the same number where the joints have one
             (Some(of), _) if of.iter().all(|n| own.contains(n)) && own.len() == joints.len() => {
-                (How::Fits, of.into_iter().map(Some).collect())
+                (ColumnAssignment::Fits, of.into_iter().map(Some).collect())
             }
             (Some(of), first) => {
                 let first = first.filter(|_| base <= 1);
                 let shift = first.map_or(0, |first| i64::from(base) - i64::from(first));
                 let shifted = |n: &u32| u32::try_from(i64::from(*n) + shift).ok();
-                (How::InPart, of.iter().map(shifted).collect())
+                (ColumnAssignment::InPart, of.iter().map(shifted).collect())
             }
             (None, _) if own.len() >= joints.len() => {
                 let numbers = own[..joints.len()].iter().copied();
-                (How::InPart, numbers.map(Some).collect())
+                (ColumnAssignment::InPart, numbers.map(Some).collect())
             }
             (None, _) => {
                 // as many joints as columns have numbers in a row: an arm without its fingers
                 let of = numbered_alike(joints, own.len()).filter(|_| from_start)?;
                 let place = |k: usize| of.iter().position(|joint| *joint == k);
                 let number = |k: usize| place(k).and_then(of_joint);
-                (How::InPart, (0..joints.len()).map(number).collect())
+                (
+                    ColumnAssignment::InPart,
+                    (0..joints.len()).map(number).collect(),
+                )
             }
         };
         let column = |number: Option<u32>| by_key(&Key::Number(number?));
@@ -275,7 +278,7 @@ pub(super) fn fit<'a>(
     }
     // one joint, one column
     if let ([_], [(_, only)]) = (joints, &family.members[..]) {
-        return Some((How::Fits, vec![Some(only)]));
+        return Some((ColumnAssignment::Fits, vec![Some(only)]));
     }
     // a joint's own name first, for the others one that is near and nobody's own
     let own = |column: &LogColumn| {
@@ -300,11 +303,11 @@ pub(super) fn fit<'a>(
     let mut columns = near.iter().flatten();
     let twice = columns.any(|column| !seen.insert(&column.name));
     if near.iter().any(Option::is_some) && !twice {
-        return Some((How::InPart, near));
+        return Some((ColumnAssignment::InPart, near));
     }
     (family.members.len() == joints.len() && joints.len() > 1).then(|| {
         let all = family.members.iter().map(|(_, column)| Some(*column));
-        (How::InOrder, all.collect())
+        (ColumnAssignment::InOrder, all.collect())
     })
 }
 
@@ -316,7 +319,7 @@ pub(super) fn temperatures(columns: &[LogColumn], joints: &[&str]) -> Option<Vec
     let mut found = families(&of, joints);
     found.sort_by_key(|family| family.penalty);
     let fitting = found.iter().filter_map(|family| fit(family, joints));
-    let mut whole = fitting.filter(|(how, _)| *how != How::InPart);
+    let mut whole = fitting.filter(|(how, _)| *how != ColumnAssignment::InPart);
     let (_, columns) = whole.next()?;
     let name = |column: Option<&LogColumn>| Some(column?.name.clone());
     columns.into_iter().map(name).collect()

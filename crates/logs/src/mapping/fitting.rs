@@ -3,24 +3,28 @@
 use std::collections::BTreeSet;
 
 use super::column::LogColumn;
-use super::family::{Family, How, families, fit, penalty};
+use super::family::{ColumnAssignment, Family, families, fit, penalty};
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, without_joint, words};
+use crate::inspect::words::{NameWord, without_joint, words};
 
 /// A family that fits, and how well: a lower rank is better.
-pub(super) struct Taken<'a> {
+pub(super) struct FamilyMatch<'a> {
     pub(super) rank: (i32, i32),
     pub(super) pattern: String,
-    pub(super) how: How,
+    pub(super) how: ColumnAssignment,
     pub(super) columns: Vec<Option<&'a LogColumn>>,
     /// Others that fit, best first, and whether the first of them is as good.
     pub(super) others: Vec<String>,
     pub(super) tie: bool,
 }
 
-impl<'a> Taken<'a> {
+impl<'a> FamilyMatch<'a> {
     /// The only one so far.
-    pub(super) fn new(pattern: String, how: How, columns: Vec<Option<&'a LogColumn>>) -> Self {
+    pub(super) fn new(
+        pattern: String,
+        how: ColumnAssignment,
+        columns: Vec<Option<&'a LogColumn>>,
+    ) -> Self {
         Self {
             rank: (0, 0),
             pattern,
@@ -47,7 +51,7 @@ fn shared_words(a: &str, b: &str) -> i32 {
 }
 
 /// For every joint the column that has its name, whatever else it says: what slides has a force, others have torques.
-fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Taken<'a>> {
+fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<FamilyMatch<'a>> {
     let mut worst = 0;
     let mut own = |joint: &&str| {
         let has = |column: &&LogColumn| {
@@ -70,7 +74,7 @@ fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Taken<'a>>
         sure.then_some(Some(column))
     };
     let columns = joints.iter().map(&mut own).collect::<Option<Vec<_>>>()?;
-    let mut taken = Taken::new(String::new(), How::Fits, columns);
+    let mut taken = FamilyMatch::new(String::new(), ColumnAssignment::Fits, columns);
     let names = taken.names();
     let apart = names.iter().collect::<BTreeSet<_>>().len() == names.len();
     (taken.rank, taken.pattern) = ((worst, i32::MAX), names.join(", "));
@@ -79,21 +83,21 @@ fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Taken<'a>>
 
 /// The names of joints without the words that all of them begin with: `left/upper` is `upper`.
 pub(super) fn without_common_head(joints: &[&str]) -> Vec<String> {
-    let all: Vec<Vec<Word>> = joints.iter().map(|joint| words(joint)).collect();
+    let all: Vec<Vec<NameWord>> = joints.iter().map(|joint| words(joint)).collect();
     let common = |k: usize| {
         let first = all.first().and_then(|spoken| spoken.get(k));
-        let same = |spoken: &Vec<Word>| {
+        let same = |spoken: &Vec<NameWord>| {
             spoken.len() > k + 1 && first.is_some_and(|first| spoken[k].text == first.text)
         };
         all.iter().all(same)
     };
     let head = (0..).take_while(|k| joints.len() > 1 && common(*k)).count();
-    let short = |(joint, spoken): (&&str, &Vec<Word>)| {
+    let short = |(joint, spoken): (&&str, &Vec<NameWord>)| {
         let from = spoken.get(head).map_or(0, |word| word.at.start);
         joint[from..].to_owned()
     };
     // numbers alone are no names
-    let named = |spoken: &Vec<Word>| spoken[head..].iter().any(|word| word.number().is_none());
+    let named = |spoken: &Vec<NameWord>| spoken[head..].iter().any(|word| word.number().is_none());
     match all.iter().all(named) {
         true => joints.iter().zip(&all).map(short).collect(),
         false => joints.iter().map(|joint| (*joint).to_owned()).collect(),
@@ -107,15 +111,21 @@ pub(super) fn best<'a>(
     commanded: bool,
     joints: &[&str],
     beside: Option<&str>,
-) -> Option<Taken<'a>> {
+) -> Option<FamilyMatch<'a>> {
     let whole = best_by(columns, role, commanded, joints, beside);
     let short = without_common_head(joints);
     let short: Vec<&str> = short.iter().map(String::as_str).collect();
-    if whole.as_ref().is_some_and(|taken| taken.how == How::Fits) || short == joints {
+    if whole
+        .as_ref()
+        .is_some_and(|taken| taken.how == ColumnAssignment::Fits)
+        || short == joints
+    {
         return whole;
     }
     let by_short = best_by(columns, role, commanded, &short, beside);
-    by_short.filter(|taken| taken.how == How::Fits).or(whole)
+    by_short
+        .filter(|taken| taken.how == ColumnAssignment::Fits)
+        .or(whole)
 }
 
 fn best_by<'a>(
@@ -124,24 +134,24 @@ fn best_by<'a>(
     commanded: bool,
     joints: &[&str],
     beside: Option<&str>,
-) -> Option<Taken<'a>> {
+) -> Option<FamilyMatch<'a>> {
     let of_role = |c: &&LogColumn| c.role == role && c.commanded == commanded && !c.external;
     let of_role: Vec<&LogColumn> = columns.iter().filter(of_role).collect();
-    let mut found: Vec<Taken> = Vec::new();
+    let mut found: Vec<FamilyMatch> = Vec::new();
     for family in families(&of_role, joints) {
         if let Some((how, columns)) = fit(&family, joints)
             && columns.iter().any(Option::is_some)
         {
             let off = match how {
-                How::Fits => 0,
-                How::InOrder => 1,
-                How::InPart => 6,
+                ColumnAssignment::Fits => 0,
+                ColumnAssignment::InOrder => 1,
+                ColumnAssignment::InPart => 6,
             };
             let missing = columns.iter().filter(|c| c.is_none()).count() as i32;
             let near = beside.map_or(0, |beside| shared_words(&family.pattern, beside));
-            found.push(Taken {
+            found.push(FamilyMatch {
                 rank: (off + family.penalty + missing, -near),
-                ..Taken::new(family.pattern, how, columns)
+                ..FamilyMatch::new(family.pattern, how, columns)
             });
         }
     }
@@ -155,7 +165,7 @@ fn best_by<'a>(
         let names = other.names();
         // another reading of the same columns is no other family
         let same = names.iter().all(|name| taken.names().contains(name));
-        if same || other.how == How::InPart {
+        if same || other.how == ColumnAssignment::InPart {
             continue;
         }
         let known = shown.contains(&names);
@@ -204,7 +214,7 @@ pub(super) fn external(columns: &[LogColumn], joints: &[&str]) -> Vec<String> {
 
 /// The only one whose columns change, where there are several joints: what they lack, if they lack one kind alone.
 /// What was commanded is no measurement of it.
-pub(super) fn left<'a>(columns: &'a [LogColumn], joints: &[&str]) -> Option<Taken<'a>> {
+pub(super) fn left<'a>(columns: &'a [LogColumn], joints: &[&str]) -> Option<FamilyMatch<'a>> {
     let may_be = |column: &LogColumn| column.span() > 0.0 && !column.commanded;
     let mut found = unsaid(columns, joints.len(), &may_be);
     found.sort_by_key(|family| std::cmp::Reverse(family.pattern.len()));
@@ -214,7 +224,11 @@ pub(super) fn left<'a>(columns: &'a [LogColumn], joints: &[&str]) -> Option<Take
     let same = |other: &Family| other.members.iter().all(|(_, column)| of_only(column));
     let (_, columns) = fit(only, joints).filter(|_| others.iter().all(same))?;
     // what is said of it says the order too
-    Some(Taken::new(only.pattern.clone(), How::Fits, columns))
+    Some(FamilyMatch::new(
+        only.pattern.clone(),
+        ColumnAssignment::Fits,
+        columns,
+    ))
 }
 
 #[cfg(test)]
@@ -225,7 +239,7 @@ mod tests {
         names.iter().map(|name| LogColumn::named(name)).collect()
     }
 
-    fn matched(joints: &[&str], names: &[&str]) -> (Vec<Option<String>>, Option<How>) {
+    fn matched(joints: &[&str], names: &[&str]) -> (Vec<Option<String>>, Option<ColumnAssignment>) {
         let columns = columns(names);
         let Some(taken) = best(&columns, ChannelRole::Position, false, joints, None) else {
             return (vec![None; joints.len()], None);
@@ -246,16 +260,21 @@ mod tests {
                 ["elbow", "wrist"],
                 ["q_wrist", "q_elbow"],
                 ["q_elbow", "q_wrist"],
-                How::Fits,
+                ColumnAssignment::Fits,
             ),
             (
                 ["joint_2", "joint_1"],
                 ["q1", "q2"],
                 ["q2", "q1"],
-                How::Fits,
+                ColumnAssignment::Fits,
             ),
-            (numbered, ["q0", "q1"], ["q0", "q1"], How::Fits),
-            (["pan", "lift"], ["q1", "q2"], ["q1", "q2"], How::InOrder),
+            (numbered, ["q0", "q1"], ["q0", "q1"], ColumnAssignment::Fits),
+            (
+                ["pan", "lift"],
+                ["q1", "q2"],
+                ["q1", "q2"],
+                ColumnAssignment::InOrder,
+            ),
         ] {
             assert_eq!(matched(&joints, &columns), (some(&expected), Some(how)));
         }
@@ -274,7 +293,7 @@ mod tests {
         assert_eq!(found[..2], some(&["q1", "q2"]));
         assert_eq!(
             (&found[2..], how),
-            (&[const { None }; 3][..], Some(How::InPart))
+            (&[const { None }; 3][..], Some(ColumnAssignment::InPart))
         );
         // a torso beside the numbered joints of an arm, and wheels that the log has not
         let torso = ["wheel", "lift", "arm_1", "arm_2"];
@@ -287,10 +306,10 @@ mod tests {
             found[1..],
             some(&["lift_position", "arm_1_position", "arm_2_position"])
         );
-        assert_eq!(how, Some(How::InPart));
+        assert_eq!(how, Some(ColumnAssignment::InPart));
         // one too many may begin anywhere
         let (found, how) = matched(&numbered, &["q0", "q1", "q2"]);
         assert_eq!(found.len(), 2);
-        assert_eq!(how, Some(How::InPart));
+        assert_eq!(how, Some(ColumnAssignment::InPart));
     }
 }

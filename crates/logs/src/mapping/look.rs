@@ -33,7 +33,7 @@ pub enum ClockSource {
 
 /// What the user says of the log.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Asked {
+pub struct LogHints {
     /// Rate of a log without times \[Hz\].
     pub rate_hz: Option<f64>,
     /// Topic of a recording.
@@ -69,7 +69,7 @@ impl SeenColumns {
 /// Looks at a log, to its end; `joints` is the number of the robot's joints where that is known.
 pub fn look(
     spec: &LogSpec,
-    asked: &Asked,
+    asked: &LogHints,
     joints: Option<usize>,
     stop: &dyn Fn() -> bool,
 ) -> Result<SeenColumns, MappingError> {

@@ -26,5 +26,5 @@ mod units;
 pub use choose::{JointColumns, Mapping};
 pub use column::LogColumn;
 pub use error::MappingError;
-pub use look::{Asked, ClockSource, SeenColumns, look};
-pub use shown::Known;
+pub use look::{ClockSource, LogHints, SeenColumns, look};
+pub use shown::UrdfJoint;

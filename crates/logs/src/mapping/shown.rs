@@ -10,7 +10,7 @@ use cft_ident_core::robot::JointKind;
 
 /// A joint of the robot, where a URDF names it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Known {
+pub struct UrdfJoint {
     pub name: String,
     pub kind: JointKind,
     /// Its largest torque [N or Nm].
@@ -18,8 +18,8 @@ pub struct Known {
 }
 
 /// The joints of the family of positions that has torques beside it and is likeliest measured, else of the largest.
-pub(super) fn shown(columns: &[LogColumn]) -> Vec<Known> {
-    let one = |name: &str, kind| Known {
+pub(super) fn shown(columns: &[LogColumn]) -> Vec<UrdfJoint> {
+    let one = |name: &str, kind| UrdfJoint {
         name: name.to_owned(),
         kind,
         torque: None,

@@ -6,8 +6,9 @@
 //! | `<kind>_<joint>` of every joint, e.g. `tau_hat_q1` | `/<kind>` | effort for torques, else position |
 //! | all others | `/columns`, the names of columns for those of joints | position |
 
+/// The arrays of a message with the states of joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Array {
+pub(super) enum StateArray {
     Position,
     Velocity,
     Effort,
@@ -18,7 +19,7 @@ pub(super) enum Array {
 pub(super) struct TopicColumns {
     pub(super) name: String,
     pub(super) names: Vec<String>,
-    pub(super) arrays: Vec<(Array, Vec<usize>)>,
+    pub(super) arrays: Vec<(StateArray, Vec<usize>)>,
 }
 
 pub(super) const JOINTS: &str = "/joint_states";
@@ -51,9 +52,9 @@ pub(super) fn topics(columns: &[String]) -> Vec<TopicColumns> {
         Some(found)
     };
     let main = [
-        ("q", Array::Position),
-        ("dq", Array::Velocity),
-        ("tau", Array::Effort),
+        ("q", StateArray::Position),
+        ("dq", StateArray::Velocity),
+        ("tau", StateArray::Effort),
     ];
     let arrays = main.map(|(kind, array)| Some((array, take(kind)?)));
     let arrays: Vec<_> = arrays.into_iter().flatten().collect();
@@ -71,8 +72,8 @@ pub(super) fn topics(columns: &[String]) -> Vec<TopicColumns> {
         let Some(found) = take(kind) else { continue };
         let torques = ["tau", "residual", "band"];
         let array = match torques.iter().any(|begins| kind.starts_with(begins)) {
-            true => Array::Effort,
-            false => Array::Position,
+            true => StateArray::Effort,
+            false => StateArray::Position,
         };
         out.push(TopicColumns {
             name: format!("/{kind}"),
@@ -84,7 +85,7 @@ pub(super) fn topics(columns: &[String]) -> Vec<TopicColumns> {
         out.push(TopicColumns {
             name: COLUMNS.to_owned(),
             names: left.iter().map(|index| columns[*index].clone()).collect(),
-            arrays: vec![(Array::Position, left)],
+            arrays: vec![(StateArray::Position, left)],
         });
     }
     out
@@ -134,8 +135,8 @@ mod tests {
 
     #[test]
     fn joints_kinds_and_what_is_left_have_topics_of_their_own() {
-        use Array::*;
-        let topic = |name: &str, names: &[&str], arrays: &[(Array, &[usize])]| TopicColumns {
+        use StateArray::*;
+        let topic = |name: &str, names: &[&str], arrays: &[(StateArray, &[usize])]| TopicColumns {
             name: name.to_owned(),
             names: names.iter().map(|n| (*n).to_owned()).collect(),
             arrays: arrays
@@ -145,7 +146,7 @@ mod tests {
         };
         let found = of("t,q_a,q_b_c,tau_a,tau_b_c,dq_a,u_1,ddq_b_c,ddq_a,q_ref_a");
         let both: &[&str] = &["a", "b_c"];
-        let states: [(Array, &[usize]); 2] = [(Position, &[1, 2]), (Effort, &[3, 4])];
+        let states: [(StateArray, &[usize]); 2] = [(Position, &[1, 2]), (Effort, &[3, 4])];
         let left = ["dq_a", "u_1", "q_ref_a"];
         let expected = [
             topic("/joint_states", both, &states),

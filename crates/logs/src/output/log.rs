@@ -13,20 +13,21 @@ use crate::log::Instant;
 /// What a log file is, by the end of its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogForm {
-    kind: Kind,
-    packing: Packing,
+    kind: LogEncoding,
+    packing: PackingKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum LogEncoding {
     Text,
     Messages,
     #[cfg(feature = "parquet")]
     Parquet,
 }
 
+/// How a log that is written is compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Packing {
+enum PackingKind {
     None,
     Gzip,
     Zstd,
@@ -42,43 +43,44 @@ impl LogForm {
 
     /// Whether it is a recording of messages.
     pub fn is_recording(self) -> bool {
-        self.kind == Kind::Messages
+        self.kind == LogEncoding::Messages
     }
 
     /// By the name of the file; `None` for any other ending.
     pub fn of(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_lowercase();
-        let packed = [(".gz", Packing::Gzip), (".zst", Packing::Zstd)];
+        let packed = [(".gz", PackingKind::Gzip), (".zst", PackingKind::Zstd)];
         let mut packed = packed.into_iter();
         let found = packed.find_map(|(end, packing)| Some((name.strip_suffix(end)?, packing)));
-        let (name, packing) = found.unwrap_or((&name, Packing::None));
+        let (name, packing) = found.unwrap_or((&name, PackingKind::None));
         let kind = match Path::new(name).extension()?.to_str()? {
-            "csv" => Kind::Text,
-            "mcap" => Kind::Messages,
+            "csv" => LogEncoding::Text,
+            "mcap" => LogEncoding::Messages,
             #[cfg(feature = "parquet")]
-            "parquet" if packing == Packing::None => Kind::Parquet,
+            "parquet" if packing == PackingKind::None => LogEncoding::Parquet,
             _ => return None,
         };
         Some(Self { kind, packing })
     }
 }
 
-pub(super) enum Packed {
+/// A file that is written, compressed as it was asked for.
+pub(super) enum PackedFile {
     Plain(AtomicFile),
     Gzip(flate2::write::GzEncoder<AtomicFile>),
     Zstd(zstd::stream::write::Encoder<'static, AtomicFile>),
 }
 
-impl Packed {
-    fn new(file: AtomicFile, packing: Packing) -> io::Result<Self> {
+impl PackedFile {
+    fn new(file: AtomicFile, packing: PackingKind) -> io::Result<Self> {
         Ok(match packing {
-            Packing::None => Self::Plain(file),
+            PackingKind::None => Self::Plain(file),
             // No clock time and no name of the file in its header.
-            Packing::Gzip => {
+            PackingKind::Gzip => {
                 let level = flate2::Compression::default();
                 Self::Gzip(flate2::write::GzEncoder::new(file, level))
             }
-            Packing::Zstd => {
+            PackingKind::Zstd => {
                 let mut encoder = zstd::stream::write::Encoder::new(file, 0)?;
                 encoder.include_checksum(true)?;
                 Self::Zstd(encoder)
@@ -103,7 +105,7 @@ impl Packed {
     }
 }
 
-impl Write for Packed {
+impl Write for PackedFile {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         self.writer().write(buffer)
     }
@@ -113,11 +115,12 @@ impl Write for Packed {
     }
 }
 
-enum Sink {
-    Text(Box<io::BufWriter<Packed>>),
-    Messages(Box<McapLog<Packed>>),
+/// What the rows of a log are written to.
+enum LogSink {
+    Text(Box<io::BufWriter<PackedFile>>),
+    Messages(Box<McapLog<PackedFile>>),
     #[cfg(feature = "parquet")]
-    Parquet(Box<ParquetLog<Packed>>),
+    Parquet(Box<ParquetLog<PackedFile>>),
 }
 
 /// Writes a log row by row: whole or not at all.
@@ -126,7 +129,7 @@ enum Sink {
 /// see [`super::mcap`]. As Parquet: a column of doubles for each channel. The bytes depend on the rows alone.
 pub struct LogWriter {
     path: std::path::PathBuf,
-    sink: Sink,
+    sink: LogSink,
     columns: usize,
     origin: Instant,
     row: Vec<f64>,
@@ -160,23 +163,25 @@ impl LogWriter {
     ) -> Result<Self, OutputError> {
         let columns: Vec<String> = columns.iter().map(|c| c.as_ref().to_owned()).collect();
         let form = LogForm::of(path).unwrap_or(LogForm {
-            kind: Kind::Text,
-            packing: Packing::None,
+            kind: LogEncoding::Text,
+            packing: PackingKind::None,
         });
         let file = AtomicFile::create(path)?;
-        let begun = Packed::new(file, form.packing).and_then(|packed| {
+        let begun = PackedFile::new(file, form.packing).and_then(|packed| {
             Ok(match form.kind {
-                Kind::Text => {
+                LogEncoding::Text => {
                     let mut buffered = io::BufWriter::with_capacity(1 << 16, packed);
                     text::begin(&mut buffered, &columns, notes)?;
-                    Sink::Text(Box::new(buffered))
+                    LogSink::Text(Box::new(buffered))
                 }
-                Kind::Messages => {
+                LogEncoding::Messages => {
                     let recording = McapLog::new(packed, &columns, notes).map_err(plain)?;
-                    Sink::Messages(Box::new(recording))
+                    LogSink::Messages(Box::new(recording))
                 }
                 #[cfg(feature = "parquet")]
-                Kind::Parquet => Sink::Parquet(Box::new(ParquetLog::new(packed, &columns, notes))),
+                LogEncoding::Parquet => {
+                    LogSink::Parquet(Box::new(ParquetLog::new(packed, &columns, notes)))
+                }
             })
         });
         Ok(Self {
@@ -206,13 +211,13 @@ impl LogWriter {
             Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
         } else {
             match &mut self.sink {
-                Sink::Text(text) => text::row(text, self.origin, &self.row),
-                Sink::Messages(recording) => {
+                LogSink::Text(text) => text::row(text, self.origin, &self.row),
+                LogSink::Messages(recording) => {
                     let written = recording.row(self.origin, &self.row);
                     written.map_err(plain)
                 }
                 #[cfg(feature = "parquet")]
-                Sink::Parquet(file) => file.row(self.origin, &self.row),
+                LogSink::Parquet(file) => file.row(self.origin, &self.row),
             }
         };
         written.map_err(|error| OutputError::new(&self.path, error))
@@ -229,12 +234,12 @@ impl LogWriter {
     /// The file with all rows in it, which lacks its name.
     pub(super) fn finish(self) -> Result<AtomicFile, OutputError> {
         let packed = match self.sink {
-            Sink::Text(text) => text.into_inner().map_err(io::IntoInnerError::into_error),
-            Sink::Messages(recording) => recording.finish().map_err(plain),
+            LogSink::Text(text) => text.into_inner().map_err(io::IntoInnerError::into_error),
+            LogSink::Messages(recording) => recording.finish().map_err(plain),
             #[cfg(feature = "parquet")]
-            Sink::Parquet(file) => file.finish(),
+            LogSink::Parquet(file) => file.finish(),
         };
-        let file = packed.and_then(Packed::finish);
+        let file = packed.and_then(PackedFile::finish);
         file.map_err(|error| OutputError::new(&self.path, error))
     }
 }
@@ -247,10 +252,13 @@ mod tests {
     fn the_ending_says_the_form_and_anything_else_is_none() {
         let of = |name: &str| LogForm::of(Path::new(name));
         let form = |kind, packing| Some(LogForm { kind, packing });
-        assert_eq!(of("a/b.csv"), form(Kind::Text, Packing::None));
-        assert_eq!(of("a.CSV.gz"), form(Kind::Text, Packing::Gzip));
-        assert_eq!(of("a.mcap"), form(Kind::Messages, Packing::None));
-        assert_eq!(of("a.mcap.zst"), form(Kind::Messages, Packing::Zstd));
+        assert_eq!(of("a/b.csv"), form(LogEncoding::Text, PackingKind::None));
+        assert_eq!(of("a.CSV.gz"), form(LogEncoding::Text, PackingKind::Gzip));
+        assert_eq!(of("a.mcap"), form(LogEncoding::Messages, PackingKind::None));
+        assert_eq!(
+            of("a.mcap.zst"),
+            form(LogEncoding::Messages, PackingKind::Zstd)
+        );
         for name in ["a.txt", "a.parquet.gz", "a.gz", "csv", "a.db3", ""] {
             assert_eq!(of(name), None, "{name}");
         }

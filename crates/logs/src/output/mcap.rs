@@ -11,7 +11,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Compression, McapError, McapResult, WriteOptions, Writer};
 
-use super::columns::{self, Array, TopicColumns};
+use super::columns::{self, StateArray, TopicColumns};
 use crate::log::Instant;
 
 /// Topic of the times that are no whole nanoseconds.
@@ -191,7 +191,11 @@ fn message(out: &mut Vec<u8>, stamp_ns: i128, topic: &TopicColumns, names: &[u8]
     // an empty frame_id, padded
     out.extend([1, 0, 0, 0, 0, 0, 0, 0]);
     out.extend(names);
-    for array in [Array::Position, Array::Velocity, Array::Effort] {
+    for array in [
+        StateArray::Position,
+        StateArray::Velocity,
+        StateArray::Effort,
+    ] {
         let columns = topic.arrays.iter().find(|(kind, _)| *kind == array);
         let columns = columns.map_or(&[][..], |(_, columns)| columns);
         doubles(out, columns.iter().map(|column| row[*column]));

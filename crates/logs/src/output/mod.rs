@@ -14,7 +14,7 @@ mod together;
 mod trajectory;
 
 pub use log::{LogForm, LogWriter};
-pub use together::Together;
+pub use together::FileBatch;
 pub use trajectory::JointTrajectory;
 
 use cft_ident_core::explain::Explain;
@@ -149,7 +149,7 @@ impl AtomicFile {
     /// # Errors
     /// A full disk, a lost connection; then there is no file.
     pub fn commit(self) -> Result<(), OutputError> {
-        let files = Together::default();
+        let files = FileBatch::default();
         files.add(self)?;
         files.commit()
     }

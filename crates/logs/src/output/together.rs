@@ -14,19 +14,19 @@ use super::{AtomicFile, LogWriter, OutputError, SUFFIX, unfinished};
 
 /// Files that are ready, and the folders that were made for them.
 #[derive(Debug, Default)]
-pub struct Together {
-    inner: Mutex<Inner>,
+pub struct FileBatch {
+    inner: Mutex<PendingFiles>,
 }
 
 #[derive(Debug, Default)]
-struct Inner {
-    ready: Vec<Ready>,
+struct PendingFiles {
+    ready: Vec<ReadyFile>,
     folders: Vec<PathBuf>,
 }
 
 /// A file that lacks only its name.
 #[derive(Debug)]
-struct Ready {
+struct ReadyFile {
     file: NamedTempFile,
     path: PathBuf,
     /// As the user named it.
@@ -39,7 +39,7 @@ struct SecondName {
     _held: Option<File>,
 }
 
-impl Together {
+impl FileBatch {
     /// Writes a file that gets its name with the others. What is no regular file is written at once.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Together {
     pub fn add(&self, file: AtomicFile) -> Result<(), OutputError> {
         let named = file.path.clone();
         if let Some((file, path)) = file.ready()? {
-            self.lock().ready.push(Ready { file, path, named });
+            self.lock().ready.push(ReadyFile { file, path, named });
         }
         Ok(())
     }
@@ -98,7 +98,7 @@ impl Together {
         let mut unfinished = unfinished();
         // with what had their names before, under other ones
         let mut renamed: Vec<(PathBuf, Option<SecondName>)> = Vec::with_capacity(ready.len());
-        for Ready { file, path, named } in ready {
+        for ReadyFile { file, path, named } in ready {
             let temporary = file.path().to_owned();
             unfinished.remove(&temporary);
             let old = match several {
@@ -128,7 +128,7 @@ impl Together {
         Ok(())
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Inner> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, PendingFiles> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -144,7 +144,7 @@ fn kept(path: &Path, temporary: &Path) -> Option<SecondName> {
     Some(SecondName { name, _held: held })
 }
 
-impl Drop for Together {
+impl Drop for FileBatch {
     fn drop(&mut self) {
         let mut inner = self.lock();
         let ready = std::mem::take(&mut inner.ready);
@@ -172,7 +172,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("a"), "old").unwrap();
-        let files = Together::default();
+        let files = FileBatch::default();
         files.write(&at("a"), b"new").unwrap();
         files.write(&at("b"), b"new").unwrap();
         assert_eq!(std::fs::read_to_string(at("a")).unwrap(), "old");
@@ -204,7 +204,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("a"), "old").unwrap();
-        let files = Together::default();
+        let files = FileBatch::default();
         for name in ["a", "b", "c"] {
             files.write(&at(name), b"new").unwrap();
         }
@@ -220,7 +220,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let inside = folder.path().join("runs").join("monday");
         for commits in [false, true] {
-            let files = Together::default();
+            let files = FileBatch::default();
             files.make_folder(&inside).unwrap();
             files.write(&inside.join("a"), b"new").unwrap();
             if commits {

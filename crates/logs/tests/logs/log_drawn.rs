@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use cft_ident_core::robot::JointKind;
 use cft_ident_logs::log::{Block, Layout, LogError, LogSpec, Reader};
-use cft_ident_logs::mapping::{Asked, ClockSource, Known, Mapping, look};
+use cft_ident_logs::mapping::{ClockSource, LogHints, Mapping, UrdfJoint, look};
 use log_support::recording::{JointState, Recording};
 use mcap::WriteOptions;
 use rand::{RngExt, SeedableRng};
@@ -51,12 +51,12 @@ impl Motion {
     }
 }
 
-fn known() -> Vec<Known> {
+fn known() -> Vec<UrdfJoint> {
     let kind = |name: &str| match name {
         "Z" => JointKind::Prismatic,
         _ => JointKind::Revolute,
     };
-    let one = |name: &str| Known {
+    let one = |name: &str| UrdfJoint {
         name: name.to_owned(),
         kind: kind(name),
         torque: None,
@@ -67,7 +67,7 @@ fn known() -> Vec<Known> {
 /// The layout that a look at the log gives.
 pub(crate) fn mapped(path: &Path) -> Layout {
     let spec = LogSpec::whole(path);
-    let asked = Asked::default();
+    let asked = LogHints::default();
     let seen = look(&spec, &asked, Some(3), &|| false).unwrap();
     let mapping = Mapping::of(Some(&known()), Some(&seen));
     let mut layout = Layout::joint_columns(&JOINTS);
@@ -258,7 +258,7 @@ fn save_as_utf8(path: &Path) -> bool {
     if !bytes.starts_with(&[0xff, 0xfe]) {
         return false;
     }
-    let error = look(&LogSpec::whole(path), &Asked::default(), None, &|| false).unwrap_err();
+    let error = look(&LogSpec::whole(path), &LogHints::default(), None, &|| false).unwrap_err();
     let text = error.to_string();
     assert!(text.contains("iconv -f UTF-16 -t UTF-8"), "{text}");
     let units: Vec<u16> = bytes[2..]

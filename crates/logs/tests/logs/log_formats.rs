@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cft_ident_core::robot::cft::actuation::ENCODER_SCALE;
-use cft_ident_core::robot::cft::{Setup, pantograph};
+use cft_ident_core::robot::cft::{LaboratorySetup, pantograph};
 use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{Block, DeclaredChannels, Layout, LogSpec, Reader, TimeUnit};
 use cft_ident_logs::output::LogWriter;
@@ -115,7 +115,7 @@ fn raw_channels_of_the_cft_robot_come_out_as_joint_positions_and_torques() {
     assert!(robot.zero_order_hold(reader.layout().channels));
     for (index, row) in rows.iter().enumerate() {
         let q = pantograph::joints(&[row[0], row[1], row[2], row[3]]).unwrap();
-        let tau = Setup::Tuedacs.volts_to_torques(&q, &[row[4], row[5], row[6], row[7]]);
+        let tau = LaboratorySetup::Tuedacs.volts_to_torques(&q, &[row[4], row[5], row[6], row[7]]);
         assert_eq!(block.q[4 * index..][..4], q);
         assert_eq!(block.tau[4 * index..][..4], tau);
     }

@@ -4,11 +4,11 @@
 //! at most those of the period. Accelerations have the clock's own in them: a blend must be long
 //! enough, and begin where that costs least.
 
-pub use crate::simulate::reference::Blend;
+pub use crate::simulate::reference::TimeScaling;
 
 use super::series::{Kinematics, Series};
 
-impl Blend {
+impl TimeScaling {
     /// Duration of the whole motion \[s\]; of the first blend and period where it does not end.
     pub fn duration(&self, period: f64) -> f64 {
         self.end(period).unwrap_or(self.seconds + period)
@@ -39,7 +39,7 @@ mod tests {
             a: vec![vec![0.2, -0.1]],
             b: vec![vec![-0.3, 0.1]],
         };
-        let blend = Blend {
+        let blend = TimeScaling {
             start: 0.7,
             seconds: 1.5,
             periods: Some(2),

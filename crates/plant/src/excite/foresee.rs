@@ -6,10 +6,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::ExciteError;
-use super::information::{Information, normalised};
+use super::information::{InformationFactors, normalised};
 use super::machine::ForeseenRobot;
 use super::motion::Motion;
-use cft_ident_core::inertia::columns::Own;
+use cft_ident_core::inertia::columns::JointTerm;
 use cft_ident_core::math::rank;
 
 /// Samples of a period at which condition and determinant are taken.
@@ -26,8 +26,8 @@ const OPEN_SHARE: f64 = 1e-3;
 /// Expected deviations together with what is given besides.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct GivenTogether {
-    pub parameters: Vec<Expected>,
-    pub confounded: Option<Pair>,
+    pub parameters: Vec<ExpectedEstimate>,
+    pub confounded: Option<CorrelatedPair>,
 }
 
 /// Condition numbers of the unweighted stacked regressor; null where its rank is short.
@@ -39,7 +39,8 @@ pub struct Condition {
 
 /// An unknown as a log of the motion is expected to give it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Expected {
+#[schemars(rename = "Expected")]
+pub struct ExpectedEstimate {
     pub name: String,
     pub unit: String,
     /// Value in the model that the motion was judged with; null where torques are not foreseen.
@@ -50,7 +51,7 @@ pub struct Expected {
     pub relative_std: Option<f64>,
 }
 
-impl Expected {
+impl ExpectedEstimate {
     pub(super) fn new(name: &str, unit: String, value: Option<f64>, std: Option<f64>) -> Self {
         let size = value.map(f64::abs).filter(|size| *size > 0.0);
         Self {
@@ -72,7 +73,8 @@ pub struct UnknownShare {
 
 /// The two unknowns whose expected errors are most correlated.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Pair {
+#[schemars(rename = "Pair")]
+pub struct CorrelatedPair {
     pub first: String,
     pub second: String,
     /// Correlation of their expected errors.
@@ -80,7 +82,7 @@ pub struct Pair {
 }
 
 /// What a motion says, however long its log.
-pub(super) struct Foresight {
+pub(super) struct MotionForesight {
     pub condition: Condition,
     pub rank: usize,
     /// log det(F'F) of the information's rows, unweighted; none where the rank is short.
@@ -100,18 +102,18 @@ pub fn information(
     motion: &Motion,
     rate_hz: f64,
     seconds: f64,
-) -> Result<(Information, f64), ExciteError> {
+) -> Result<(InformationFactors, f64), ExciteError> {
     match motion {
         Motion::Periodic { series, blend } => {
             let whole = blend.periods.map(|n| series.period() * f64::from(n));
-            let information = Information::of_period(machine, series, SAMPLES)?;
+            let information = InformationFactors::of_period(machine, series, SAMPLES)?;
             Ok((information, rate_hz * whole.unwrap_or(seconds)))
         }
         Motion::Path { at, seconds } => {
             let samples = (RATE * seconds).ceil().max(2.0) as usize;
             let step = seconds / samples as f64;
             let at = |m: usize| at(step * (m as f64 + 0.5));
-            let information = Information::of_path(machine, samples, &at)?;
+            let information = InformationFactors::of_path(machine, samples, &at)?;
             Ok((information, rate_hz * seconds))
         }
     }
@@ -120,8 +122,8 @@ pub fn information(
 /// Foresees what the rows themselves distinguish.
 pub(super) fn foresee(
     machine: &ForeseenRobot,
-    information: &Information,
-) -> Result<Foresight, ExciteError> {
+    information: &InformationFactors,
+) -> Result<MotionForesight, ExciteError> {
     let plain = information.stacked(&vec![1.0; machine.coordinates()]);
     let scaled = normalised(&plain)?;
     let largest = scaled.s.iter().copied().next().unwrap_or(0.0);
@@ -139,7 +141,7 @@ pub(super) fn foresee(
         parameter,
         weight: if turned { -weight } else { weight },
     };
-    Ok(Foresight {
+    Ok(MotionForesight {
         condition: Condition {
             raw: full.then(|| rank::condition(&singular)),
             normalised: full.then(|| rank::condition(&scaled.s)),
@@ -153,7 +155,7 @@ pub(super) fn foresee(
 /// Foresees a fit to `rows` rows per joint with their noise, friction known, and what is given besides by its noise.
 pub(super) fn expected(
     machine: &ForeseenRobot,
-    information: &Information,
+    information: &InformationFactors,
     rows: f64,
     given: Option<&DMatrix<f64>>,
 ) -> Result<GivenTogether, ExciteError> {
@@ -168,7 +170,7 @@ pub(super) fn expected(
     let parameters = names.iter().enumerate().map(|(i, name)| {
         let std = determined[i].then(|| covariance[(i, i)].sqrt());
         let value = machine.source.known().then_some(values[i]);
-        Expected::new(name, unit(machine, i), value, std)
+        ExpectedEstimate::new(name, unit(machine, i), value, std)
     });
     Ok(GivenTogether {
         parameters: parameters.collect(),
@@ -207,7 +209,11 @@ pub(super) fn inverse(g: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), Exc
 }
 
 /// The pair of unknowns whose errors are most correlated.
-fn confounded(covariance: &DMatrix<f64>, determined: &[bool], names: &[String]) -> Option<Pair> {
+fn confounded(
+    covariance: &DMatrix<f64>,
+    determined: &[bool],
+    names: &[String],
+) -> Option<CorrelatedPair> {
     let p = names.len();
     let mut most: Option<(f64, usize, usize)> = None;
     let open = |i: usize| !determined[i];
@@ -220,7 +226,7 @@ fn confounded(covariance: &DMatrix<f64>, determined: &[bool], names: &[String]) 
             }
         }
     }
-    most.map(|(correlation, i, j)| Pair {
+    most.map(|(correlation, i, j)| CorrelatedPair {
         first: names[i].clone(),
         second: names[j].clone(),
         correlation,
@@ -238,7 +244,7 @@ fn unit(machine: &ForeseenRobot, i: usize) -> String {
         if let Some(own) = i.checked_sub(first).and_then(|k| own.get(k)) {
             let kind = robot.joint_kind(j);
             return match own {
-                Own::Viscous => format!("{} s/{}", kind.torque_unit(), kind.position_unit()),
+                JointTerm::Viscous => format!("{} s/{}", kind.torque_unit(), kind.position_unit()),
                 _ => kind.torque_unit().to_owned(),
             };
         }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::simulate::Mechanism;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::robot_file::CoordinateLimits;
 use cft_ident_files::config::trajectory::{FourierCoordinate, FourierSection};
@@ -37,8 +37,8 @@ pub fn machine(
     let (model, source) = TorqueSource::of(file, &robot, model)?;
     let own = match (file.friction.fitted_with_inertias, file.friction.offset) {
         (false, _) => Vec::new(),
-        (true, false) => vec![Own::Viscous, Own::Coulomb],
-        (true, true) => vec![Own::Viscous, Own::Coulomb, Own::Offset],
+        (true, false) => vec![JointTerm::Viscous, JointTerm::Coulomb],
+        (true, true) => vec![JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset],
     };
     let mut machine = ForeseenRobot {
         columns: RegressorColumns {

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use cft_ident_core::inertia::accumulate::BlockFactors;
 
-use super::information::Information;
+use super::information::InformationFactors;
 use super::machine::ForeseenRobot;
 
 /// F'F of every joint's rows, as many as a log holds.
@@ -48,7 +48,7 @@ impl GivenInformation {
     }
 
     /// Adds a motion of which `rows` rows per joint are logged.
-    pub fn add_motion(&mut self, information: &Information, rows: f64) {
+    pub fn add_motion(&mut self, information: &InformationFactors, rows: f64) {
         let weight = rows / information.rows as f64;
         for (g, r) in self.joints.iter_mut().zip(&information.joints) {
             *g += r.tr_mul(r) * weight;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use cft_ident_core::math::jacobi::Svd;
+use cft_ident_core::math::jacobi::SvdFactors;
 use cft_ident_core::math::rank;
 use cft_ident_core::math::rfactor::RFactor;
 use cft_ident_core::robot::RobotError;
@@ -14,14 +14,14 @@ use super::series::{Kinematics, Series};
 
 /// R factors of the rows of each joint along a motion.
 #[derive(Debug, Clone)]
-pub struct Information {
+pub struct InformationFactors {
     /// Upper triangles, p x p.
     pub joints: Vec<DMatrix<f64>>,
     /// Rows per joint.
     pub rows: u64,
 }
 
-impl Information {
+impl InformationFactors {
     /// Of whole periods of a series, at `samples` equal steps of one period.
     ///
     /// # Errors
@@ -110,7 +110,7 @@ impl Information {
 }
 
 /// Singular values of the columns scaled to norm 1; columns of zeros stay.
-pub(super) fn normalised(r: &DMatrix<f64>) -> Result<Svd, NoValue> {
+pub(super) fn normalised(r: &DMatrix<f64>) -> Result<SvdFactors, NoValue> {
     let mut scaled = r.clone();
     for mut column in scaled.column_iter_mut() {
         let norm = column.norm();

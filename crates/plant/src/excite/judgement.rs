@@ -5,14 +5,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::foresee::{
-    Condition, Expected, GivenTogether, Pair, UnknownShare, expected, foresee, information,
+    Condition, CorrelatedPair, ExpectedEstimate, GivenTogether, UnknownShare, expected, foresee,
+    information,
 };
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::motion::{spectrum, torque_band};
 use super::series::Series;
-use super::strokes::Separation;
-use super::usage::{Use, along_way};
+use super::strokes::EffectSeparation;
+use super::usage::{ChannelUse, along_way};
 use super::{ExciteError, GivenInformation, Motion};
 use cft_ident_core::number;
 
@@ -23,7 +24,8 @@ const ALIKE: f64 = 0.95;
 
 /// What there is to say about a motion.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Judgement {
+#[schemars(rename = "Judgement")]
+pub struct MotionJudgement {
     /// Of the unweighted stacked regressor, along a period of a series.
     pub condition: Condition,
     /// log det(F'F) of `samples_per_period` rows per joint, unweighted; null where the rank is short.
@@ -49,10 +51,10 @@ pub struct Judgement {
     /// What nobody looked at, in one sentence.
     pub not_checked: String,
     /// Expected deviations, friction known.
-    pub parameters: Vec<Expected>,
+    pub parameters: Vec<ExpectedEstimate>,
     /// The combination of columns, scaled to norm 1, that is least certain; largest parts first.
     pub weakest_direction: Vec<UnknownShare>,
-    pub confounded: Option<Pair>,
+    pub confounded: Option<CorrelatedPair>,
     /// The same with what is given besides.
     pub together: Option<GivenTogether>,
     /// Of a one-joint move: what it says about the joint's friction.
@@ -64,7 +66,7 @@ pub struct Judgement {
     /// Rate of the log that is foreseen \[Hz\].
     pub rate_hz: f64,
     /// Of a series alone.
-    pub spectrum: Option<Vec<Amplitudes>>,
+    pub spectrum: Option<Vec<SpeedAmplitudes>>,
     /// Of a series alone, where torques are foreseen.
     pub band: Option<Vec<PowerBand>>,
     /// Duration of the motion \[s\].
@@ -79,7 +81,7 @@ pub struct Judgement {
     pub evaluations: Option<u64>,
     /// Of strokes that tell an effect from its like.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub separates: Option<Separation>,
+    pub separates: Option<EffectSeparation>,
     /// What a reader should know.
     #[serde(skip)]
     pub warnings: Vec<String>,
@@ -121,7 +123,7 @@ pub struct LimitUse {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LawForeseen {
     pub joint: String,
-    pub parameters: Vec<Expected>,
+    pub parameters: Vec<ExpectedEstimate>,
     /// Relative deviations from the usual ladder, in the same order.
     pub usual_relative_std: Option<Vec<Option<f64>>>,
 }
@@ -136,7 +138,8 @@ pub struct TorqueNoise {
 
 /// Amplitudes of a coordinate's speed.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Amplitudes {
+#[schemars(rename = "Amplitudes")]
+pub struct SpeedAmplitudes {
     pub coordinate: String,
     /// "m/s" or "rad/s".
     pub unit: String,
@@ -155,21 +158,22 @@ pub struct PowerBand {
 /// Judgements of several motions, each designed to complement those before it: the last one's fields,
 /// and all of them where there are several.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Judgements {
+#[schemars(rename = "Judgements")]
+pub struct MotionJudgements {
     #[serde(flatten)]
-    pub last: Judgement,
+    pub last: MotionJudgement,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub trajectories: Vec<Judgement>,
+    pub trajectories: Vec<MotionJudgement>,
 }
 
-impl Judgements {
+impl MotionJudgements {
     /// None where there is none.
-    pub fn of(mut trajectories: Vec<Judgement>) -> Option<Self> {
+    pub fn of(mut trajectories: Vec<MotionJudgement>) -> Option<Self> {
         let last = trajectories.last()?.clone();
         if trajectories.len() == 1 {
             trajectories.clear();
         }
-        Some(Judgements { last, trajectories })
+        Some(MotionJudgements { last, trajectories })
     }
 }
 
@@ -201,7 +205,7 @@ pub fn judge(
     machine: &ForeseenRobot,
     motion: &Motion,
     terms: MotionTerms,
-) -> Result<Judgement, ExciteError> {
+) -> Result<MotionJudgement, ExciteError> {
     let uses = motion.usage(machine, terms.channels);
     let first = motion.at(0.0);
     let way = (terms.from).map(|from| along_way(machine, terms.channels, from, &first));
@@ -233,7 +237,7 @@ pub fn judge(
         joint: joint.clone(),
         torque_std: *std,
     });
-    Ok(Judgement {
+    Ok(MotionJudgement {
         condition: foresight.condition,
         log_det: foresight.log_det,
         rank: foresight.rank,
@@ -266,9 +270,9 @@ pub fn judge(
 }
 
 /// Amplitudes of a series, coordinate after coordinate.
-fn amplitudes(machine: &ForeseenRobot, names: &[String], series: &Series) -> Vec<Amplitudes> {
+fn amplitudes(machine: &ForeseenRobot, names: &[String], series: &Series) -> Vec<SpeedAmplitudes> {
     let rows = names.iter().zip(spectrum(series)).enumerate();
-    rows.map(|(i, (coordinate, speed_amplitudes))| Amplitudes {
+    rows.map(|(i, (coordinate, speed_amplitudes))| SpeedAmplitudes {
         coordinate: coordinate.clone(),
         unit: format!("{}/s", machine.coordinate_unit(i)),
         speed_amplitudes,
@@ -291,7 +295,7 @@ fn band(machine: &ForeseenRobot, series: &Series) -> Result<Option<Vec<PowerBand
 }
 
 /// What the motion does not distinguish.
-fn cautions(confounded: Option<&Pair>, rank: usize, unknowns: usize) -> Vec<String> {
+fn cautions(confounded: Option<&CorrelatedPair>, rank: usize, unknowns: usize) -> Vec<String> {
     let mut warnings = Vec::new();
     if let Some(pair) = confounded
         && pair.correlation.abs() > ALIKE
@@ -309,9 +313,9 @@ fn cautions(confounded: Option<&Pair>, rank: usize, unknowns: usize) -> Vec<Stri
     warnings
 }
 
-fn limits_used(names: &[String], uses: &[Use]) -> Vec<LimitsUsed> {
+fn limits_used(names: &[String], uses: &[ChannelUse]) -> Vec<LimitsUsed> {
     let share = |quantity: Quantity, i: usize| {
-        let of = |u: &&Use| u.channel.quantity == quantity && u.channel.index == i;
+        let of = |u: &&ChannelUse| u.channel.quantity == quantity && u.channel.index == i;
         uses.iter().find(of).map(|u| u.share)
     };
     let of = |(i, name): (usize, &String)| LimitsUsed {
@@ -325,7 +329,7 @@ fn limits_used(names: &[String], uses: &[Use]) -> Vec<LimitsUsed> {
 }
 
 impl LimitUse {
-    fn of(along: &Use) -> Self {
+    fn of(along: &ChannelUse) -> Self {
         let channel = &along.channel;
         LimitUse {
             name: channel.name.clone(),
@@ -372,7 +376,7 @@ impl LimitUse {
     }
 }
 
-impl Judgement {
+impl MotionJudgement {
     /// With what torques are foreseen and what nobody looked at, the more urgent first.
     pub fn first_words(&self) -> [&str; 2] {
         let (torques, not_checked) = (self.torques.as_str(), self.not_checked.as_str());

@@ -9,7 +9,7 @@ use cft_ident_files::config::model_file::Parameter;
 
 use super::ExciteError;
 use super::foresee::inverse;
-use super::information::Information;
+use super::information::InformationFactors;
 use super::machine::ForeseenRobot;
 
 /// What is known from the logs of a model.
@@ -51,7 +51,7 @@ impl InformationBefore {
     pub fn factors(
         &self,
         machine: &ForeseenRobot,
-        (usual, rows): (&Information, f64),
+        (usual, rows): (&InformationFactors, f64),
     ) -> Result<Vec<f64>, ExciteError> {
         let r = usual.stacked(&machine.weights());
         let g = r.tr_mul(&r) * (rows / usual.rows as f64) + &self.information;

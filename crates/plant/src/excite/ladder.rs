@@ -18,7 +18,7 @@ use cft_ident_files::config::identified::friction_unit;
 use cft_ident_files::config::trajectory::SingleJointMove;
 
 use super::ExciteError;
-use super::foresee::{Expected, scaled_to_one};
+use super::foresee::{ExpectedEstimate, scaled_to_one};
 use super::from_files::place_of;
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
@@ -68,7 +68,7 @@ pub struct LadderTask {
 pub struct DesignedLadder {
     pub file: SingleJointMove,
     /// The law's parameters, as a log of the design is expected to give them.
-    pub expected: Vec<Expected>,
+    pub expected: Vec<ExpectedEstimate>,
     /// Relative standard deviations from the usual ladder, in the same order.
     pub usual: Vec<Option<f64>>,
     pub evaluations: u64,
@@ -83,13 +83,13 @@ pub fn design_ladder(
     machine: &ForeseenRobot,
     task: &LadderTask,
 ) -> Result<DesignedLadder, ExciteError> {
-    let bench = Bench::of(machine, task)?;
+    let bench = LadderBench::of(machine, task)?;
     if bench.law().parameters() == 0 {
         return Err(bench.no_law());
     }
     let (usual, before) = bench.widest()?;
     let (slowest, fastest) = ends(&usual.speeds);
-    let value = |rungs: &Rungs| match bench.expectation(rungs) {
+    let value = |rungs: &LadderDesign| match bench.expectation(rungs) {
         Ok(expected) => bench.score(&expected),
         Err(_) => f64::INFINITY,
     };
@@ -97,11 +97,11 @@ pub fn design_ladder(
         let ratio = |k: usize| k as f64 / (count - 1) as f64;
         let spread = |k| (slowest.ln() + ratio(k) * (fastest / slowest).ln()).min(fastest.ln());
         let start: Vec<f64> = (0..count).map(spread).chain([TURN.ln()]).collect();
-        let rungs = |x: &[f64]| -> Rungs {
+        let rungs = |x: &[f64]| -> LadderDesign {
             let within = |x: &f64| x.exp().clamp(0.2 * slowest, fastest);
             let mut speeds: Vec<f64> = x[..count].iter().map(within).collect();
             speeds.sort_by(f64::total_cmp);
-            Rungs {
+            LadderDesign {
                 range: usual.range,
                 speeds,
                 turn: x[count].exp().clamp(TURNS[0], TURNS[1]),
@@ -117,7 +117,7 @@ pub fn design_ladder(
         let best = nelder_mead(&mut f, &start, &steps, 1e-4, EVALUATIONS);
         (best.value, rungs(&best.x), best.evaluations)
     };
-    let found: Vec<(f64, Rungs, u64)> = COUNTS.into_par_iter().map(search).collect();
+    let found: Vec<(f64, LadderDesign, u64)> = COUNTS.into_par_iter().map(search).collect();
     let evaluations = found.iter().map(|f| f.2).sum();
     let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let at_start = bench.score(&before);
@@ -142,14 +142,14 @@ pub fn foresee_ladder(
     machine: &ForeseenRobot,
     task: &LadderTask,
     file: &SingleJointMove,
-) -> Result<Vec<Expected>, ExciteError> {
-    let bench = Bench::of(machine, task)?;
+) -> Result<Vec<ExpectedEstimate>, ExciteError> {
+    let bench = LadderBench::of(machine, task)?;
     bench.expected(file).map(|(expected, _)| expected)
 }
 
 /// What a design turns.
 #[derive(Debug, Clone)]
-struct Rungs {
+struct LadderDesign {
     /// m or rad; what the limits leave where absent.
     range: Option<[f64; 2]>,
     /// m/s or rad/s.
@@ -158,7 +158,7 @@ struct Rungs {
     turn: f64,
 }
 
-impl Rungs {
+impl LadderDesign {
     /// Lowers the top speed; not below the others.
     fn slow_down(&mut self) -> bool {
         let Some(top) = self.speeds.last().map(|top| SLOWER_TOP * top) else {
@@ -189,13 +189,13 @@ fn ends(speeds: &[f64]) -> (f64, f64) {
 
 /// A machine, what is asked of it and the joint that it is asked of.
 #[derive(Clone, Copy)]
-struct Bench<'a> {
+struct LadderBench<'a> {
     machine: &'a ForeseenRobot,
     task: &'a LadderTask,
     joint: usize,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> LadderBench<'a> {
     fn of(machine: &'a ForeseenRobot, task: &'a LadderTask) -> Result<Self, ExciteError> {
         Ok(Self {
             machine,
@@ -215,7 +215,7 @@ impl<'a> Bench<'a> {
     }
 
     /// The usual ladder over the widest part of the travel at which the drives keep their limits, and what it says.
-    fn widest(&self) -> Result<(Rungs, Vec<Expected>), ExciteError> {
+    fn widest(&self) -> Result<(LadderDesign, Vec<ExpectedEstimate>), ExciteError> {
         let mut refused = None;
         for part in PARTS.map(|part| part * self.task.part) {
             let mut usual = self.usual(part)?;
@@ -242,7 +242,7 @@ impl<'a> Bench<'a> {
         Some(three_digits((1.0 - self.task.reserve) * limit.upper))
     }
 
-    fn move_of(&self, rungs: &Rungs) -> SingleJointMove {
+    fn move_of(&self, rungs: &LadderDesign) -> SingleJointMove {
         SingleJointMove {
             joint: self.task.joint.clone(),
             speeds: rungs.speeds.clone(),
@@ -253,7 +253,7 @@ impl<'a> Bench<'a> {
     }
 
     /// The ladder that the simulator runs where no file says otherwise, over a part of the travel.
-    fn usual(&self, part: f64) -> Result<Rungs, ExciteError> {
+    fn usual(&self, part: f64) -> Result<LadderDesign, ExciteError> {
         let mechanism = &self.machine.mechanism;
         let mut mover = OneJointMove::new(self.joint, self.task.seconds, Some(self.task.seed));
         mover.acceleration = self.acceleration();
@@ -268,7 +268,7 @@ impl<'a> Bench<'a> {
         }
         speeds.sort_by(f64::total_cmp);
         speeds.dedup();
-        Ok(Rungs {
+        Ok(LadderDesign {
             range: mover.range.map(|(low, high)| [low, high]),
             speeds,
             turn: TURN,
@@ -292,7 +292,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Expected deviations of a ladder of these rungs, refused where the drive would be beyond its limit.
-    fn expectation(&self, rungs: &Rungs) -> Result<Vec<Expected>, ExciteError> {
+    fn expectation(&self, rungs: &LadderDesign) -> Result<Vec<ExpectedEstimate>, ExciteError> {
         let (expected, (used, drive)) = self.expected(&self.move_of(rungs))?;
         if used > 1.0 - self.task.reserve {
             return Err(ExciteError::BeyondDrive {
@@ -306,9 +306,9 @@ impl<'a> Bench<'a> {
     }
 
     /// Sum of the logs of the slopes' relative variances, with a little of the others': the worst does not hide the rest.
-    fn score(&self, expected: &[Expected]) -> f64 {
+    fn score(&self, expected: &[ExpectedEstimate]) -> f64 {
         let slopes = matches!(self.law(), JointFriction::DoubleTanh(_));
-        let one = |e: &Expected| {
+        let one = |e: &ExpectedEstimate| {
             let relative = e.relative_std.unwrap_or(f64::INFINITY);
             let weight = match slopes && !e.name.starts_with("slope") {
                 true => OTHERS,
@@ -323,7 +323,7 @@ impl<'a> Bench<'a> {
     fn expected(
         &self,
         file: &SingleJointMove,
-    ) -> Result<(Vec<Expected>, (f64, usize)), ExciteError> {
+    ) -> Result<(Vec<ExpectedEstimate>, (f64, usize)), ExciteError> {
         let (machine, task, joint) = (self.machine, self.task, self.joint);
         let (model, mechanism) = (&machine.model, &machine.mechanism);
         let ladder = OneJointMove::of(file, &mechanism.robot, task.seconds, task.seed)?;
@@ -341,7 +341,7 @@ impl<'a> Bench<'a> {
         let rows = names.iter().zip(values).zip(variances);
         let expected = rows.map(|((name, value), variance)| {
             let unit = friction_unit(&model.robot, joint, name, torque);
-            Expected::new(name, unit, Some(value), variance.map(f64::sqrt))
+            ExpectedEstimate::new(name, unit, Some(value), variance.map(f64::sqrt))
         });
         Ok((expected.collect(), used))
     }

@@ -6,16 +6,16 @@
 
 use cft_ident_core::math::minimise::lbfgs;
 
-use super::objective::{Multipliers, Objective, Work};
+use super::objective::{LagrangeMultipliers, Objective, ObjectiveWorkspace};
 
 /// One round: sharpness of the criterion, evaluations it may take.
-pub(super) type Round = (f64, u64);
+pub(super) type LagrangianRound = (f64, u64);
 
 /// A search that can be continued.
 #[derive(Debug, Clone)]
-pub(super) struct Search {
+pub(super) struct LagrangianSearch {
     pub z: Vec<f64>,
-    multipliers: Multipliers,
+    multipliers: LagrangeMultipliers,
     pub evaluations: u64,
 }
 
@@ -26,11 +26,11 @@ const HEAVIEST: f64 = 2e3;
 /// Derivative below which a round is done.
 const FLAT: f64 = 1e-4;
 
-impl Search {
+impl LagrangianSearch {
     pub fn new(objective: &Objective, z: Vec<f64>) -> Self {
         Self {
             z,
-            multipliers: Multipliers::new(objective.constraints(), FIRST_WEIGHT),
+            multipliers: LagrangeMultipliers::new(objective.constraints(), FIRST_WEIGHT),
             evaluations: 0,
         }
     }
@@ -39,9 +39,9 @@ impl Search {
     pub fn run(
         &mut self,
         objective: &Objective,
-        rounds: &[Round],
+        rounds: &[LagrangianRound],
         most: u64,
-        work: &mut Work,
+        work: &mut ObjectiveWorkspace,
         stop: &dyn Fn() -> bool,
     ) {
         for (sharpness, evaluations) in rounds {

@@ -4,11 +4,11 @@
 use std::cell::OnceCell;
 
 use crate::simulate::Mechanism;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::robot::RobotError;
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::tree::pose::{Frame, frames};
-use cft_ident_files::config::trajectory::Coordinates;
+use cft_ident_files::config::trajectory::TrajectoryCoordinates;
 
 use super::foreseen::TorqueSource;
 use super::limits::{BoundedQuantity, Quantity};
@@ -63,7 +63,7 @@ impl State {
 
 /// Friction and signs of one instant as straight lines in the velocities, so that differences do not meet their bends.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Linearised {
+pub(super) struct LinearisedFriction {
     friction: [(f64, f64); MAX_COORDINATES],
     sign: [(f64, f64); MAX_COORDINATES],
     v: [f64; MAX_COORDINATES],
@@ -86,10 +86,10 @@ impl ForeseenRobot {
     }
 
     /// The coordinates in which motions of this machine are designed.
-    pub fn designed(&self) -> Coordinates {
+    pub fn designed(&self) -> TrajectoryCoordinates {
         match self.mechanism.motors_at_joints() {
-            true => Coordinates::Joint,
-            false => Coordinates::Cartesian,
+            true => TrajectoryCoordinates::Joint,
+            false => TrajectoryCoordinates::Cartesian,
         }
     }
 
@@ -122,9 +122,9 @@ impl ForeseenRobot {
         let mut values = self.model.theta.clone();
         for (j, own) in self.columns.own.iter().enumerate() {
             values.extend(own.iter().map(|own| match (own, &self.model.friction[j]) {
-                (Own::Offset, _) => self.model.offset[j],
-                (Own::Viscous, JointFriction::ViscousCoulomb(law)) => law.viscous,
-                (Own::Coulomb, JointFriction::ViscousCoulomb(law)) => law.coulomb,
+                (JointTerm::Offset, _) => self.model.offset[j],
+                (JointTerm::Viscous, JointFriction::ViscousCoulomb(law)) => law.viscous,
+                (JointTerm::Coulomb, JointFriction::ViscousCoulomb(law)) => law.coulomb,
                 _ => 0.0,
             }));
         }
@@ -199,8 +199,8 @@ impl ForeseenRobot {
     }
 
     /// Friction and signs at the velocities of a state.
-    pub(super) fn linearised(&self, state: &State) -> Linearised {
-        let mut out = Linearised {
+    pub(super) fn linearised(&self, state: &State) -> LinearisedFriction {
+        let mut out = LinearisedFriction {
             friction: [(0.0, 0.0); MAX_COORDINATES],
             sign: [(0.0, 0.0); MAX_COORDINATES],
             v: state.v,
@@ -223,7 +223,7 @@ impl ForeseenRobot {
     pub(super) fn rows(
         &self,
         state: &mut State,
-        line: &Linearised,
+        line: &LinearisedFriction,
         torques: bool,
         y: &mut [f64],
     ) -> Result<(), RobotError> {
@@ -240,7 +240,7 @@ impl ForeseenRobot {
             self.drive(state)?;
         }
         self.own_columns(y, |j, own| match own {
-            Own::Coulomb => beyond(j, line.sign[j]),
+            JointTerm::Coulomb => beyond(j, line.sign[j]),
             own => own.column(v[j]),
         });
         Ok(())
@@ -266,7 +266,7 @@ impl ForeseenRobot {
     }
 
     /// Spreads inertial rows to whole ones, with the joints' own columns.
-    fn own_columns(&self, y: &mut [f64], column: impl Fn(usize, &Own) -> f64) {
+    fn own_columns(&self, y: &mut [f64], column: impl Fn(usize, &JointTerm) -> f64) {
         let (p, shared) = (self.unknowns(), self.columns.shared);
         // from the last to the first: they only move up
         for j in (0..self.coordinates()).rev() {
@@ -281,8 +281,8 @@ impl ForeseenRobot {
 
     /// What channels bound at a state.
     #[inline]
-    pub fn quantities<'a>(&'a self, state: &'a State) -> Quantities<'a> {
-        Quantities {
+    pub fn quantities<'a>(&'a self, state: &'a State) -> BoundQuantities<'a> {
+        BoundQuantities {
             machine: self,
             state,
             frames: OnceCell::new(),
@@ -293,7 +293,7 @@ impl ForeseenRobot {
 
 /// What channels bound at one state.
 #[derive(Debug)]
-pub struct Quantities<'a> {
+pub struct BoundQuantities<'a> {
     machine: &'a ForeseenRobot,
     state: &'a State,
     frames: OnceCell<Vec<Frame>>,
@@ -301,7 +301,7 @@ pub struct Quantities<'a> {
     half_widths: OnceCell<[[f64; MAX_COORDINATES]; 2]>,
 }
 
-impl Quantities<'_> {
+impl BoundQuantities<'_> {
     /// How far the quantity of a channel may be off, 95 % of the time.
     #[inline]
     pub fn half_width(&self, channel: &BoundedQuantity) -> f64 {

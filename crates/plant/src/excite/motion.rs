@@ -8,12 +8,12 @@ use cft_ident_core::robot::Robot;
 use cft_ident_files::config::trajectory::{FourierSection, Trajectory};
 
 use super::ExciteError;
-use super::blend::Blend;
+use super::blend::TimeScaling;
 use super::from_files::series_of;
 use super::limits::BoundedQuantity;
 use super::machine::ForeseenRobot;
 use super::series::{Kinematics, MAX_COORDINATES, Series};
-use super::usage::{Use, along, along_blend, along_period, joined};
+use super::usage::{ChannelUse, along, along_blend, along_period, joined};
 
 /// Step of the differences that give the acceleration of a reference \[s\].
 const STEP: f64 = 1e-4;
@@ -28,14 +28,17 @@ const MOST_PERIODS: f64 = 1000.0;
 const MAX_DURATION_S: f64 = 1e5;
 
 /// Coordinates over time.
-type At = Box<dyn Fn(f64) -> Kinematics + Send + Sync>;
+type KinematicsFunction = Box<dyn Fn(f64) -> Kinematics + Send + Sync>;
 
 /// A motion from rest to rest, or one that repeats itself.
 pub enum Motion {
     /// A Fourier series in the designed coordinates.
-    Periodic { series: Series, blend: Blend },
+    Periodic { series: Series, blend: TimeScaling },
     /// Any other reference, over its duration \[s\].
-    Path { at: At, seconds: f64 },
+    Path {
+        at: KinematicsFunction,
+        seconds: f64,
+    },
 }
 
 impl Motion {
@@ -100,7 +103,7 @@ impl Motion {
     }
 
     /// How near the motion comes to every channel, blends and what lies between samples included.
-    pub fn usage(&self, machine: &ForeseenRobot, channels: &[BoundedQuantity]) -> Vec<Use> {
+    pub fn usage(&self, machine: &ForeseenRobot, channels: &[BoundedQuantity]) -> Vec<ChannelUse> {
         match self {
             Self::Periodic { series, blend } => {
                 let whole = along_period(machine, channels, series);
@@ -123,8 +126,8 @@ fn short_enough(seconds: f64) -> Result<(), ExciteError> {
 }
 
 /// Start, blend and periods of a file, blended as the simulator does where it does not say.
-fn blend_of(file: &FourierSection) -> Blend {
-    Blend {
+fn blend_of(file: &FourierSection) -> TimeScaling {
+    TimeScaling {
         start: file.start_s.unwrap_or(0.0),
         seconds: file.blend_s.unwrap_or(BLEND),
         periods: file.periods,

@@ -15,10 +15,10 @@ use cft_ident_core::robot::RobotError;
 
 use super::criterion::{Criterion, Slope};
 use super::limits::BoundedQuantity;
-use super::machine::{ForeseenRobot, Linearised, State};
-use super::series::{Basis, Kinematics, MAX_COORDINATES, Series};
+use super::machine::{ForeseenRobot, LinearisedFriction, State};
+use super::series::{HarmonicBasis, Kinematics, MAX_COORDINATES, Series};
 use super::usage::along_period;
-use super::variables::Variables;
+use super::variables::DesignVariables;
 
 /// Step in a position, as a share of half its span.
 const STEP_SHARE_OF_SPAN: f64 = 2e-3;
@@ -46,7 +46,7 @@ pub struct PriorInformation {
 
 /// Multipliers and weight of the augmented Lagrangian.
 #[derive(Debug, Clone)]
-pub(super) struct Multipliers {
+pub(super) struct LagrangeMultipliers {
     /// One per constraint of [`Objective::constraints`].
     pub lambda: Vec<f64>,
     /// Weight rho of a violation's square.
@@ -58,12 +58,12 @@ pub(super) struct Multipliers {
 pub(super) struct Objective<'a> {
     pub machine: &'a ForeseenRobot,
     pub criterion: &'a Criterion,
-    pub variables: Variables,
+    pub variables: DesignVariables,
     pub prior: Option<&'a PriorInformation>,
     /// Samples at which the regressor is taken.
-    basis: Basis,
+    basis: HarmonicBasis,
     /// Samples at which limits are kept: friction turns round between those of the regressor.
-    fine: Basis,
+    fine: HarmonicBasis,
     /// Linear channels, then the others, as the search keeps them.
     linear: Vec<BoundedQuantity>,
     curved: Vec<BoundedQuantity>,
@@ -73,12 +73,12 @@ pub(super) struct Objective<'a> {
 
 /// What an evaluation writes into: nothing is allocated per sample.
 #[derive(Debug, Clone)]
-pub(super) struct Work {
+pub(super) struct ObjectiveWorkspace {
     pub series: Series,
     states: Vec<State>,
     /// Beside them, where differences are taken.
     beside: State,
-    lines: Vec<Linearised>,
+    lines: Vec<LinearisedFriction>,
     /// Rows of the fit, sample after sample.
     rows: Vec<f64>,
     weights: Vec<f64>,
@@ -93,7 +93,7 @@ impl<'a> Objective<'a> {
         machine: &'a ForeseenRobot,
         criterion: &'a Criterion,
         channels: &[BoundedQuantity],
-        variables: Variables,
+        variables: DesignVariables,
         prior: Option<&'a PriorInformation>,
         samples: usize,
     ) -> Self {
@@ -107,8 +107,8 @@ impl<'a> Objective<'a> {
             machine,
             criterion,
             prior,
-            basis: Basis::new(samples, variables.harmonics),
-            fine: Basis::new(FINER * samples, variables.harmonics),
+            basis: HarmonicBasis::new(samples, variables.harmonics),
+            fine: HarmonicBasis::new(FINER * samples, variables.harmonics),
             linear,
             curved,
             weights,
@@ -133,11 +133,11 @@ impl<'a> Objective<'a> {
     }
 
     /// Empty buffers.
-    pub fn work(&self) -> Work {
+    pub fn work(&self) -> ObjectiveWorkspace {
         let (n, p) = (self.machine.coordinates(), self.machine.unknowns());
         let samples = self.basis.samples;
         let rest = self.machine.linearised(&State::EMPTY);
-        Work {
+        ObjectiveWorkspace {
             series: Series::still(self.variables.fundamental, n, self.variables.harmonics),
             states: vec![State::EMPTY; samples],
             beside: State::EMPTY,
@@ -156,7 +156,7 @@ impl<'a> Objective<'a> {
     }
 
     /// Rows of the fit along the period, and F'F of them (with the prior).
-    fn information(&self, work: &mut Work) -> Result<DMatrix<f64>, NoValue> {
+    fn information(&self, work: &mut ObjectiveWorkspace) -> Result<DMatrix<f64>, NoValue> {
         let (n, p) = (self.machine.coordinates(), self.machine.unknowns());
         let mut g = DMatrix::zeros(p, p);
         for m in 0..self.basis.samples {
@@ -193,8 +193,8 @@ impl<'a> Objective<'a> {
         &self,
         z: &[f64],
         sharpness: f64,
-        multipliers: &Multipliers,
-        work: &mut Work,
+        multipliers: &LagrangeMultipliers,
+        work: &mut ObjectiveWorkspace,
         gradient: &mut [f64],
     ) -> Result<f64, NoValue> {
         self.variables.series(z, &mut work.series);
@@ -210,7 +210,11 @@ impl<'a> Objective<'a> {
     }
 
     /// Penalty of the linear channels, with its derivative.
-    fn linear_penalty(&self, multipliers: &Multipliers, work: &mut Work) -> f64 {
+    fn linear_penalty(
+        &self,
+        multipliers: &LagrangeMultipliers,
+        work: &mut ObjectiveWorkspace,
+    ) -> f64 {
         let width = 1 + 2 * self.variables.harmonics;
         let (mut total, mut at) = (0.0, 0);
         for channel in &self.linear {
@@ -236,7 +240,11 @@ impl<'a> Objective<'a> {
     }
 
     /// The criterion's derivative, by way of the rows.
-    fn along_the_path(&self, slope: &DMatrix<f64>, work: &mut Work) -> Result<(), NoValue> {
+    fn along_the_path(
+        &self,
+        slope: &DMatrix<f64>,
+        work: &mut ObjectiveWorkspace,
+    ) -> Result<(), NoValue> {
         let (n, p) = (self.machine.coordinates(), self.machine.unknowns());
         let rows = self
             .prior
@@ -253,7 +261,7 @@ impl<'a> Objective<'a> {
             }
             let state = work.states[m];
             let line = work.lines[m];
-            let mut local = Local {
+            let mut local = SampleObjective {
                 objective: self,
                 line: &line,
                 weights: Some(&work.weights),
@@ -269,7 +277,11 @@ impl<'a> Objective<'a> {
     }
 
     /// Penalty of the channels that are not linear, with its derivative.
-    fn curved_penalty(&self, multipliers: &Multipliers, work: &mut Work) -> Result<f64, NoValue> {
+    fn curved_penalty(
+        &self,
+        multipliers: &LagrangeMultipliers,
+        work: &mut ObjectiveWorkspace,
+    ) -> Result<f64, NoValue> {
         let mut total = 0.0;
         let mut at = 2 * self.linear.len() * self.fine.samples;
         if self.curved.is_empty() {
@@ -293,7 +305,7 @@ impl<'a> Objective<'a> {
             }
             if pressed {
                 let line = self.machine.linearised(&state);
-                let mut local = Local {
+                let mut local = SampleObjective {
                     objective: self,
                     line: &line,
                     weights: None,
@@ -309,7 +321,7 @@ impl<'a> Objective<'a> {
         Ok(total)
     }
 
-    fn kinematics(&self, basis: &Basis, series: &Series, m: usize) -> Kinematics {
+    fn kinematics(&self, basis: &HarmonicBasis, series: &Series, m: usize) -> Kinematics {
         let mut k = Kinematics::REST;
         for i in 0..self.machine.coordinates() {
             [k.x[i], k.xd[i], k.xdd[i]] = basis.at(series, i, m);
@@ -321,9 +333,9 @@ impl<'a> Objective<'a> {
     pub fn update(
         &self,
         z: &[f64],
-        multipliers: &mut Multipliers,
+        multipliers: &mut LagrangeMultipliers,
         factor: f64,
-        work: &mut Work,
+        work: &mut ObjectiveWorkspace,
     ) -> Result<(), NoValue> {
         self.variables.series(z, &mut work.series);
         let mut state = State::EMPTY;
@@ -357,7 +369,7 @@ impl<'a> Objective<'a> {
     }
 }
 
-impl Multipliers {
+impl LagrangeMultipliers {
     /// All zero, with a first weight.
     pub fn new(constraints: usize, weight: f64) -> Self {
         let lambda = vec![0.0; constraints];
@@ -375,9 +387,9 @@ impl Multipliers {
 }
 
 /// The number that is differentiated at one sample.
-struct Local<'a> {
+struct SampleObjective<'a> {
     objective: &'a Objective<'a>,
-    line: &'a Linearised,
+    line: &'a LinearisedFriction,
     /// 2 w F S, n x p.
     weights: Option<&'a [f64]>,
     /// Pressure of each curved channel; empty where only rows count.
@@ -386,7 +398,7 @@ struct Local<'a> {
     state: &'a mut State,
 }
 
-impl Local<'_> {
+impl SampleObjective<'_> {
     fn value(&mut self, k: &Kinematics) -> Result<f64, RobotError> {
         let (machine, state) = (self.objective.machine, &mut *self.state);
         machine.follow(k, state)?;

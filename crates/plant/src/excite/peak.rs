@@ -2,7 +2,7 @@
 
 /// Where a function is highest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Peak {
+pub struct FunctionPeak {
     /// Argument of the highest value found.
     pub t: f64,
     /// That value.
@@ -27,16 +27,16 @@ pub(super) fn highest(
     samples: &[f64],
     curvature: Option<f64>,
     tolerance: f64,
-) -> Peak {
+) -> FunctionPeak {
     let pieces = samples.len().saturating_sub(1).max(1);
     let h = (to - from) / pieces as f64;
     let at = |k: usize| from + (to - from) * k as f64 / pieces as f64;
-    let mut peak = Peak {
+    let mut peak = FunctionPeak {
         t: from,
         value: f64::NEG_INFINITY,
         bound: f64::NEG_INFINITY,
     };
-    let see = |peak: &mut Peak, t: f64, value: f64| {
+    let see = |peak: &mut FunctionPeak, t: f64, value: f64| {
         // a value that is not a number counts as beyond everything
         let value = if value.is_nan() { f64::INFINITY } else { value };
         if value > peak.value {
@@ -101,7 +101,7 @@ mod tests {
         span: [f64; 2],
         parts: u32,
         curvature: Option<f64>,
-    ) -> Peak {
+    ) -> FunctionPeak {
         let at = |k: u32| span[0] + (span[1] - span[0]) * f64::from(k) / f64::from(parts);
         let samples: Vec<f64> = (0..=parts).map(|k| f(at(k))).collect();
         super::highest(f, span, &samples, curvature, 1e-9)

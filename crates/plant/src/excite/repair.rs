@@ -3,7 +3,7 @@
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::series::Series;
-use super::usage::{Care, about_period, along_period, worst};
+use super::usage::{ScanEffort, about_period, along_period, worst};
 
 /// Steps towards the common factor, and how near to it they end.
 const MAX_STEPS: usize = 40;
@@ -19,7 +19,7 @@ pub(super) fn repaired(
     channels: &[BoundedQuantity],
     series: &Series,
     fixed: &[Option<f64>],
-    care: Care,
+    care: ScanEffort,
 ) -> Option<Series> {
     fitted(machine, channels, series, fixed, care).or_else(|| {
         let mut centred = series.clone();
@@ -39,7 +39,7 @@ fn fitted(
     channels: &[BoundedQuantity],
     series: &Series,
     fixed: &[Option<f64>],
-    care: Care,
+    care: ScanEffort,
 ) -> Option<Series> {
     let mut series = series.clone();
     let (linear, curved): (Vec<_>, Vec<_>) =
@@ -55,7 +55,7 @@ fn fitted(
             series.scale(channel.index, (1.0 - ROUNDING) / share);
         }
     }
-    let share = |care: Care, factor: f64| {
+    let share = |care: ScanEffort, factor: f64| {
         let scaled = series.scaled(factor);
         worst(&about_period(machine, &curved, &scaled, care))
     };
@@ -67,8 +67,8 @@ fn fitted(
     if kept.1 > 1.0 {
         return None;
     }
-    if care == Care::Thorough {
-        let roughly = |factor| share(Care::Rough, factor);
+    if care == ScanEffort::Thorough {
+        let roughly = |factor| share(ScanEffort::Rough, factor);
         let about = narrowed(&roughly, kept, broken, ROUGH_TOLERANCE).0;
         for tried in [1.0 - ROUGH_TOLERANCE, 1.0 + ROUGH_TOLERANCE].map(|x| about * x) {
             if kept.0 < tried && tried < broken.0 {

@@ -7,20 +7,20 @@ use rayon::prelude::*;
 
 use super::ExciteError;
 use super::criterion::Criterion;
-use super::information::Information;
-use super::lagrangian::{Round, Search};
+use super::information::InformationFactors;
+use super::lagrangian::{LagrangianRound, LagrangianSearch};
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::objective::{Objective, PriorInformation};
 use super::repair::repaired;
 use super::series::Series;
 use super::start::random_motion;
-use super::usage::{Care, Use, along_period, most_broken, worst};
-use super::variables::Variables;
+use super::usage::{ChannelUse, ScanEffort, along_period, most_broken, worst};
+use super::variables::DesignVariables;
 
 /// What is to be designed, and how hard to look.
 #[derive(Debug, Clone)]
-pub struct Task {
+pub struct DesignTask {
     pub criterion: Criterion,
     /// Fundamental frequency \[Hz\].
     pub fundamental_hz: f64,
@@ -50,12 +50,12 @@ pub struct FoundMotion {
 }
 
 /// What a start has given: the criterion and the motion within the limits.
-type Best = Option<(f64, Series)>;
+type BestTrial = Option<(f64, Series)>;
 
 /// Rounds that every start gets.
-const FIRST: [Round; 3] = [(6.0, 60), (8.0, 40), (12.0, 40)];
+const FIRST: [LagrangianRound; 3] = [(6.0, 60), (8.0, 40), (12.0, 40)];
 /// Rounds that the best of them get on top.
-const SECOND: [Round; 8] = [
+const SECOND: [LagrangianRound; 8] = [
     (16.0, 100),
     (24.0, 100),
     (32.0, 100),
@@ -66,7 +66,7 @@ const SECOND: [Round; 8] = [
     (192.0, 100),
 ];
 /// Rounds after torques and volts have been looked at between the samples.
-const LAST: [Round; 3] = [(128.0, 80), (192.0, 80), (256.0, 80)];
+const LAST: [LagrangianRound; 3] = [(128.0, 80), (192.0, 80), (256.0, 80)];
 /// Excess between samples, as a share of the limit, that is left to the repair.
 const MAX_EXCESS_SHARE: f64 = 2e-3;
 /// One start in so many gets the second part.
@@ -74,10 +74,10 @@ const FINALISTS: usize = 4;
 /// Samples of the period per harmonic in the search.
 const SAMPLES_PER_HARMONIC: usize = 12;
 
-impl Task {
+impl DesignTask {
     /// Evaluations that the search will take at most.
     pub fn most_evaluations(&self) -> u64 {
-        let sum = |rounds: &[Round]| rounds.iter().map(|round| round.1).sum::<u64>();
+        let sum = |rounds: &[LagrangianRound]| rounds.iter().map(|round| round.1).sum::<u64>();
         let most = self.evaluations.unwrap_or(u64::MAX);
         let first = sum(&FIRST).min(most);
         let last = (sum(&SECOND) + sum(&LAST)).min(most - first);
@@ -99,7 +99,7 @@ impl Task {
 /// repaired.
 pub fn design(
     machine: &ForeseenRobot,
-    task: &Task,
+    task: &DesignTask,
     progress: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<FoundMotion, ExciteError> {
@@ -107,26 +107,32 @@ pub fn design(
     let channels: Vec<BoundedQuantity> = reserved.collect();
     check(machine, task, &channels)?;
     let (w, offsets) = (TAU * task.fundamental_hz, task.offsets.clone());
-    let variables = Variables::new(&channels, w, task.harmonics, offsets);
+    let variables = DesignVariables::new(&channels, w, task.harmonics, offsets);
     let samples = (SAMPLES_PER_HARMONIC * task.harmonics).max(25);
     let prior = task.prior.as_ref();
     let criterion = &task.criterion;
     let objective = Objective::new(machine, criterion, &channels, variables, prior, samples);
-    let effort = Effort {
+    let effort = SearchBudget {
         most: task.evaluations.unwrap_or(u64::MAX),
         spent: AtomicU64::new(0),
         progress,
         stop,
     };
-    let finish = |search: &Search| {
+    let finish = |search: &LagrangianSearch| {
         let mut series = objective.work().series;
         objective.variables.series(&search.z, &mut series);
-        let series = repaired(machine, &channels, &series, &task.offsets, Care::Thorough)?;
+        let series = repaired(
+            machine,
+            &channels,
+            &series,
+            &task.offsets,
+            ScanEffort::Thorough,
+        )?;
         let series = rounded(machine, &channels, series);
         let value = value(machine, task, &series)?;
         Some((value, series))
     };
-    let mut searches: Vec<(usize, Search, Best)> = (0..task.starts)
+    let mut searches: Vec<(usize, LagrangianSearch, BestTrial)> = (0..task.starts)
         .into_par_iter()
         .filter_map(|start| {
             // one start is looked through whatever happens
@@ -135,7 +141,7 @@ pub fn design(
             }
             let motion = random_motion(machine, &channels, &objective.variables, task.seed, start);
             let z = objective.variables.of(&motion);
-            let mut search = Search::new(&objective, z);
+            let mut search = LagrangianSearch::new(&objective, z);
             effort.step(&objective, &mut search, &FIRST);
             let found = finish(&search);
             Some((start, search, found))
@@ -146,7 +152,7 @@ pub fn design(
     searches[..last]
         .par_iter_mut()
         .for_each(|(_, search, found)| {
-            let mut keep_better = |search: &Search| {
+            let mut keep_better = |search: &LagrangianSearch| {
                 let after = finish(search);
                 if order(&after, found).is_lt() {
                     *found = after;
@@ -171,13 +177,13 @@ pub fn design(
 }
 
 /// Which of two starts has given more; one without a motion comes last.
-fn order(a: &Best, b: &Best) -> std::cmp::Ordering {
-    let of = |x: &Best| x.as_ref().map_or(f64::INFINITY, |x| x.0);
+fn order(a: &BestTrial, b: &BestTrial) -> std::cmp::Ordering {
+    let of = |x: &BestTrial| x.as_ref().map_or(f64::INFINITY, |x| x.0);
     of(a).total_cmp(&of(b))
 }
 
 /// What a design may take, and has taken.
-struct Effort<'a> {
+struct SearchBudget<'a> {
     /// Evaluations of each start.
     most: u64,
     /// Those of all starts so far.
@@ -186,13 +192,18 @@ struct Effort<'a> {
     stop: &'a AtomicBool,
 }
 
-impl Effort<'_> {
+impl SearchBudget<'_> {
     fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
     /// Takes a search through some rounds.
-    fn step(&self, objective: &Objective, search: &mut Search, rounds: &[Round]) {
+    fn step(
+        &self,
+        objective: &Objective,
+        search: &mut LagrangianSearch,
+        rounds: &[LagrangianRound],
+    ) {
         let mut work = objective.work();
         let before = search.evaluations;
         search.run(objective, rounds, self.most, &mut work, &|| self.stopped());
@@ -203,8 +214,8 @@ impl Effort<'_> {
 }
 
 /// The criterion as it is, smaller is better.
-fn value(machine: &ForeseenRobot, task: &Task, series: &Series) -> Option<f64> {
-    let information = Information::of_period(machine, series, 40 * task.harmonics).ok()?;
+fn value(machine: &ForeseenRobot, task: &DesignTask, series: &Series) -> Option<f64> {
+    let information = InformationFactors::of_period(machine, series, 40 * task.harmonics).ok()?;
     let value = information.value(machine, &task.criterion, task.prior.as_ref());
     value.ok().filter(|value| value.is_finite())
 }
@@ -228,7 +239,7 @@ fn rounded(machine: &ForeseenRobot, channels: &[BoundedQuantity], series: Series
 /// Refuses what no search can mend.
 fn check(
     machine: &ForeseenRobot,
-    task: &Task,
+    task: &DesignTask,
     channels: &[BoundedQuantity],
 ) -> Result<(), ExciteError> {
     let names = machine.coordinate_names();
@@ -264,12 +275,12 @@ fn check(
 fn nothing_fits(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
-    variables: &Variables,
-    task: &Task,
+    variables: &DesignVariables,
+    task: &DesignTask,
 ) -> ExciteError {
     let rest = random_motion(machine, channels, variables, task.seed, 0).scaled(0.0);
     let uses = along_period(machine, channels, &rest);
-    let Some(Use { channel, range, .. }) = most_broken(uses) else {
+    let Some(ChannelUse { channel, range, .. }) = most_broken(uses) else {
         return ExciteError::NothingExcited {
             unknowns: machine.unknowns(),
             starts: task.starts,

@@ -119,14 +119,14 @@ impl Series {
 
 /// sin and cos of every harmonic at equal steps of one period.
 #[derive(Debug, Clone)]
-pub(super) struct Basis {
+pub(super) struct HarmonicBasis {
     pub samples: usize,
     pub harmonics: usize,
     /// (sin, cos) of (l+1) 2 pi m / samples at entry m N + l.
     table: Vec<(f64, f64)>,
 }
 
-impl Basis {
+impl HarmonicBasis {
     pub fn new(samples: usize, harmonics: usize) -> Self {
         // whole turns taken off, so that large angles lose nothing
         let turns = |m: usize, l: usize| (m * l % samples) as f64 / samples as f64;
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_table_of_the_period_gives_the_series_and_its_adjoint() {
         let series = series();
-        let basis = Basis::new(20, 3);
+        let basis = HarmonicBasis::new(20, 3);
         for m in 0..20 {
             let t = series.period() * m as f64 / 20.0;
             for i in 0..2 {

@@ -19,7 +19,7 @@ const DISTANCE: f64 = 0.02;
 #[derive(Debug, Clone, Default)]
 pub struct DesignSpace {
     points: Vec<Point>,
-    pairs: Vec<Pair>,
+    pairs: Vec<LinkPair>,
     /// Away from where things fall, a unit vector of the base frame.
     up: Vector,
     /// Height of the floor \[m\].
@@ -40,7 +40,7 @@ struct Point {
 
 /// Two links that are no neighbours.
 #[derive(Debug, Clone)]
-struct Pair {
+struct LinkPair {
     names: [String; 2],
     one: Vec<Capsule>,
     other: Vec<Capsule>,
@@ -151,7 +151,7 @@ impl DesignSpace {
                 let names = [name(*a), name(*b)];
                 let shown = format!("{} to {}", escape(&names[0]), escape(&names[1]));
                 channels.push(apart(Quantity::Distance, space.pairs.len(), &shown));
-                space.pairs.push(Pair { names, one, other });
+                space.pairs.push(LinkPair { names, one, other });
             }
         }
         (space, channels)
@@ -170,7 +170,7 @@ impl DesignSpace {
                 height - self.floor.unwrap_or(0.0)
             }
             _ => {
-                let Pair { one, other, .. } = &self.pairs[index];
+                let LinkPair { one, other, .. } = &self.pairs[index];
                 let pairs = one.iter().flat_map(|a| other.iter().map(move |b| (a, b)));
                 let apart = pairs.map(|(a, b)| a.distance(b, frames));
                 apart.fold(f64::INFINITY, f64::min)

@@ -8,8 +8,8 @@ use super::limits::BoundedQuantity;
 use super::machine::ForeseenRobot;
 use super::repair::repaired;
 use super::series::Series;
-use super::usage::Care;
-use super::variables::Variables;
+use super::usage::ScanEffort;
+use super::variables::DesignVariables;
 
 /// Standard deviation of the offsets about the middle, in half spans.
 const SPREAD: f64 = 0.2;
@@ -24,7 +24,7 @@ const SAMPLES: usize = 64;
 pub(super) fn random_motion(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
-    variables: &Variables,
+    variables: &DesignVariables,
     seed: u64,
     number: usize,
 ) -> Series {
@@ -43,8 +43,14 @@ pub(super) fn random_motion(
         }
     }
     let large = series.scaled(START_EXCESS);
-    repaired(machine, channels, &large, &variables.fixed, Care::Rough)
-        .unwrap_or_else(|| series.scaled(0.0))
+    repaired(
+        machine,
+        channels,
+        &large,
+        &variables.fixed,
+        ScanEffort::Rough,
+    )
+    .unwrap_or_else(|| series.scaled(0.0))
 }
 
 /// A random motion that fills the limits: what stands for a usual one.
@@ -59,7 +65,7 @@ fn usual(
     harmonics: usize,
 ) -> impl Fn(usize) -> Series + '_ {
     let (channels, free) = (&machine.channels, vec![None; machine.coordinates()]);
-    let variables = Variables::new(channels, fundamental, harmonics, free);
+    let variables = DesignVariables::new(channels, fundamental, harmonics, free);
     move |number| random_motion(machine, channels, &variables, USUAL_SEED, number)
 }
 

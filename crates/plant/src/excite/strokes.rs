@@ -6,7 +6,9 @@ use cft_ident_core::effect::{backlash, presliding, smooth_coulomb};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use cft_ident_files::config::trajectory::{Coordinates, Point, PointsSection, Trajectory};
+use cft_ident_files::config::trajectory::{
+    Point, PointsSection, Trajectory, TrajectoryCoordinates,
+};
 
 use super::ExciteError;
 use super::from_files::place_of;
@@ -36,7 +38,7 @@ const NOTHING: f64 = 1e-9;
 
 /// The effect that is in question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Memory {
+pub enum FrictionMemory {
     /// A play: the torque is missing over a fixed way after a reversal.
     Gap,
     /// A bristle: the torque builds up over a way after a reversal.
@@ -47,7 +49,7 @@ pub enum Memory {
 #[derive(Debug, Clone)]
 pub struct StrokesTask {
     pub joint: String,
-    pub effect: Memory,
+    pub effect: FrictionMemory,
     /// Gap, or way over which friction builds up \[m or rad\].
     pub width: f64,
     /// Size of its torque \[N or Nm\].
@@ -62,7 +64,8 @@ pub struct StrokesTask {
 
 /// How far a motion tells an effect from its like.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Separation {
+#[schemars(rename = "Separation")]
+pub struct EffectSeparation {
     pub joint: String,
     /// Gap, or way over which friction builds up \[m or rad\].
     pub width: f64,
@@ -78,7 +81,7 @@ pub struct Separation {
 #[derive(Debug, Clone)]
 pub struct DesignedStrokes {
     pub file: PointsSection,
-    pub separation: Separation,
+    pub separation: EffectSeparation,
 }
 
 /// Designs the strokes of one joint about the middle of the positions that its limits allow.
@@ -117,23 +120,23 @@ pub fn design_strokes(
         let by_acceleration = turn * (amplitude / acceleration).sqrt();
         by_speed.max(by_acceleration).max(PERIODS / task.cutoff_hz)
     };
-    let file_of = |path: &Strokes| {
+    let file_of = |path: &StrokePath| {
         let points = path.points.iter().map(|[t, x]| {
             let mut position = pose.clone();
             position[joint] += x;
             Point { t: *t, position }
         });
         PointsSection {
-            coordinates: Coordinates::Joint,
+            coordinates: TrajectoryCoordinates::Joint,
             points: points.collect(),
         }
     };
-    let mut path = Strokes::of(&amplitudes, &period);
+    let mut path = StrokePath::of(&amplitudes, &period);
     let mut file = file_of(&path);
     // where one stroke goes over into the next a curve through the points is faster than either
     let slower = slower_by(machine, joint, &file, free)?;
     if slower > 1.0 {
-        path = Strokes::of(&amplitudes, &|amplitude| slower * period(amplitude));
+        path = StrokePath::of(&amplitudes, &|amplitude| slower * period(amplitude));
         file = file_of(&path);
     }
     let rows = 2.0 * task.cutoff_hz;
@@ -142,7 +145,7 @@ pub fn design_strokes(
     let (from, deviations) = separation(&path, task, noise);
     Ok(DesignedStrokes {
         file,
-        separation: Separation {
+        separation: EffectSeparation {
             joint: task.joint.clone(),
             width: task.width,
             amplitudes,
@@ -178,14 +181,14 @@ fn slower_by(
 }
 
 /// A way to and fro: times and positions, and its parts as amplitude, period and begin.
-struct Strokes {
+struct StrokePath {
     points: Vec<[f64; 2]>,
-    parts: Vec<Part>,
+    parts: Vec<StrokePart>,
     seconds: f64,
 }
 
 /// A piece of a cosine from `from` to `to` and back, or from one end to the next.
-struct Part {
+struct StrokePart {
     begin: f64,
     seconds: f64,
     /// Position at its begin and half a period later.
@@ -193,7 +196,7 @@ struct Part {
     period: f64,
 }
 
-impl Part {
+impl StrokePart {
     /// Position, speed and acceleration.
     fn at(&self, t: f64) -> [f64; 3] {
         let (middle, half) = (
@@ -206,13 +209,13 @@ impl Part {
     }
 }
 
-impl Strokes {
+impl StrokePath {
     fn of(amplitudes: &[f64], period: &dyn Fn(f64) -> f64) -> Self {
-        let mut parts: Vec<Part> = Vec::new();
+        let mut parts: Vec<StrokePart> = Vec::new();
         let mut begin = 0.0;
         let mut add = |ends: [f64; 2], period: f64, cycles: f64| {
             let seconds = cycles * period;
-            parts.push(Part {
+            parts.push(StrokePart {
                 begin,
                 seconds,
                 ends,
@@ -246,7 +249,7 @@ impl Strokes {
         if let Some(last) = parts.last() {
             points.push([begin, last.at(begin)[0]]);
         }
-        Strokes {
+        StrokePath {
             points,
             parts,
             seconds: begin,
@@ -296,7 +299,7 @@ impl Torque {
 }
 
 /// The like that comes nearest to the effect, and the torque that it leaves in standard errors.
-fn separation(path: &Strokes, task: &StrokesTask, noise: f64) -> (&'static str, f64) {
+fn separation(path: &StrokePath, task: &StrokesTask, noise: f64) -> (&'static str, f64) {
     let rate = 2.0 * task.cutoff_hz * SAMPLES_PER_ROW as f64;
     let count = (path.seconds * rate) as usize;
     let samples: Vec<[f64; 3]> = (0..count).map(|k| path.at(k as f64 / rate)).collect();
@@ -317,8 +320,8 @@ fn separation(path: &Strokes, task: &StrokesTask, noise: f64) -> (&'static str, 
         column(&|s| s[1].signum()),
     ];
     let own = match task.effect {
-        Memory::Gap => Torque::Gap(task.width),
-        Memory::Bristle => Torque::Bristle(task.width),
+        FrictionMemory::Gap => Torque::Gap(task.width),
+        FrictionMemory::Bristle => Torque::Bristle(task.width),
     };
     let own: Vec<f64> = along(own).iter().map(|x| task.torque * x).collect();
     let fastest = samples
@@ -326,8 +329,8 @@ fn separation(path: &Strokes, task: &StrokesTask, noise: f64) -> (&'static str, 
         .fold(0.0, |most: f64, s| most.max(s[1].abs()));
     let likes = OTHERS.iter().flat_map(|part| {
         let memory = match task.effect {
-            Memory::Gap => (presliding::ENTRY.name, Torque::Bristle(part * task.width)),
-            Memory::Bristle => (backlash::ENTRY.name, Torque::Gap(part * task.width)),
+            FrictionMemory::Gap => (presliding::ENTRY.name, Torque::Bristle(part * task.width)),
+            FrictionMemory::Bristle => (backlash::ENTRY.name, Torque::Gap(part * task.width)),
         };
         let slow = Torque::OverSpeed(part / 8.0 * fastest);
         [memory, (smooth_coulomb::ENTRY.name, slow)]
@@ -371,7 +374,7 @@ fn beside(basis: impl Iterator<Item = Vec<f64>>, mut own: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    fn task(effect: Memory, torque: f64) -> StrokesTask {
+    fn task(effect: FrictionMemory, torque: f64) -> StrokesTask {
         StrokesTask {
             joint: "q1".into(),
             effect,
@@ -383,8 +386,8 @@ mod tests {
         }
     }
 
-    fn path(amplitudes: &[f64]) -> Strokes {
-        Strokes::of(amplitudes, &|_| 0.6)
+    fn path(amplitudes: &[f64]) -> StrokePath {
+        StrokePath::of(amplitudes, &|_| 0.6)
     }
 
     const AROUND: [f64; 5] = [0.005, 0.008, 0.013, 0.04, 0.08];
@@ -407,7 +410,7 @@ mod tests {
 
     #[test]
     fn strokes_around_a_gap_tell_it_from_its_like_and_strokes_inside_of_it_do_not() {
-        for effect in [Memory::Gap, Memory::Bristle] {
+        for effect in [FrictionMemory::Gap, FrictionMemory::Bristle] {
             let of = |amplitudes: &[f64]| separation(&path(amplitudes), &task(effect, 2.0), 0.1).1;
             let (around, inside) = (of(&AROUND), of(&[0.0002; 5]));
             assert!(around > 5.0, "{around}");
@@ -417,7 +420,8 @@ mod tests {
 
     #[test]
     fn the_separation_grows_with_the_torque_and_falls_with_the_noise() {
-        let of = |torque, noise| separation(&path(&AROUND), &task(Memory::Gap, torque), noise).1;
+        let of =
+            |torque, noise| separation(&path(&AROUND), &task(FrictionMemory::Gap, torque), noise).1;
         let one = of(1.0, 0.1);
         assert!((of(2.0, 0.1) / one - 2.0).abs() < 1e-9);
         assert!((of(1.0, 0.2) / one - 0.5).abs() < 1e-9);

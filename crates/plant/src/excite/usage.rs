@@ -1,10 +1,10 @@
 //! How near a motion comes to each limit, between samples too.
 
 use super::ExciteError;
-use super::blend::Blend;
+use super::blend::TimeScaling;
 use super::limits::BoundedQuantity;
-use super::machine::{ForeseenRobot, Quantities, State};
-use super::peak::{Peak, highest};
+use super::machine::{BoundQuantities, ForeseenRobot, State};
+use super::peak::{FunctionPeak, highest};
 use super::series::{Kinematics, Series};
 
 /// First parts of a period for what is not a trigonometric polynomial: friction turns round within milliseconds.
@@ -14,7 +14,7 @@ const TOLERANCE: f64 = 1e-7;
 
 /// How exactly a period is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Care {
+pub(super) enum ScanEffort {
     /// To a thousandth, for a start of a search.
     Rough,
     /// As what is written must keep its limits.
@@ -23,7 +23,7 @@ pub(super) enum Care {
 
 /// A channel along a motion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Use {
+pub struct ChannelUse {
     pub channel: BoundedQuantity,
     /// Least and most of the quantity, of a torque with its 95 % band.
     pub range: [f64; 2],
@@ -39,7 +39,7 @@ pub fn along_period(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
     series: &Series,
-) -> Vec<Use> {
+) -> Vec<ChannelUse> {
     period(machine, channels, series, PARTS, TOLERANCE)
 }
 
@@ -48,11 +48,11 @@ pub(super) fn about_period(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
     series: &Series,
-    care: Care,
-) -> Vec<Use> {
+    care: ScanEffort,
+) -> Vec<ChannelUse> {
     match care {
-        Care::Thorough => period(machine, channels, series, PARTS, 1e-5),
-        Care::Rough => period(machine, channels, series, 96, 1e-3),
+        ScanEffort::Thorough => period(machine, channels, series, PARTS, 1e-5),
+        ScanEffort::Rough => period(machine, channels, series, 96, 1e-3),
     }
 }
 
@@ -62,7 +62,7 @@ fn period(
     series: &Series,
     parts: usize,
     tolerance: f64,
-) -> Vec<Use> {
+) -> Vec<ChannelUse> {
     let (at, span) = (|t| series.at(t), [0.0, series.period()]);
     let curved = channels.iter().filter(|c| !c.quantity.is_linear());
     let curved: Vec<&BoundedQuantity> = curved.collect();
@@ -81,7 +81,7 @@ pub(super) fn along(
     at: &dyn Fn(f64) -> Kinematics,
     span: [f64; 2],
     parts: usize,
-) -> Vec<Use> {
+) -> Vec<ChannelUse> {
     let channels: Vec<&BoundedQuantity> = channels.iter().collect();
     of_path(machine, &channels, at, span, parts, TOLERANCE)
 }
@@ -91,8 +91,8 @@ pub fn along_blend(
     machine: &ForeseenRobot,
     channels: &[BoundedQuantity],
     series: &Series,
-    blend: &Blend,
-) -> Vec<Use> {
+    blend: &TimeScaling,
+) -> Vec<ChannelUse> {
     let at = |t| blend.at(series, t);
     let parts = (PARTS as f64 * (blend.seconds / series.period()).max(0.25)).ceil() as usize;
     let over = |span| along(machine, channels, &at, span, parts);
@@ -114,7 +114,7 @@ pub(super) fn along_way(
     channels: &[BoundedQuantity],
     from: &[f64],
     to: &Kinematics,
-) -> Vec<Use> {
+) -> Vec<ChannelUse> {
     let at = |share: f64| {
         let mut k = Kinematics::REST;
         for ((x, from), to) in k.x.iter_mut().zip(from).zip(to.x) {
@@ -143,7 +143,7 @@ pub fn check_pose(machine: &ForeseenRobot, from: &[f64]) -> Result<(), ExciteErr
 }
 
 /// The limit that is broken most; none where all hold.
-pub(super) fn most_broken(uses: Vec<Use>) -> Option<Use> {
+pub(super) fn most_broken(uses: Vec<ChannelUse>) -> Option<ChannelUse> {
     let worst = uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share));
     worst.filter(|found| found.share > 1.0)
 }
@@ -153,7 +153,7 @@ const DURATIONS: [f64; 10] = [0.4, 0.5, 0.64, 0.8, 1.0, 1.2, 1.6, 2.0, 3.2, 6.4]
 /// Points of the period at which the motion may begin.
 const STARTS: u32 = 16;
 
-impl Blend {
+impl TimeScaling {
     /// The shortest blend of those tried along which every channel holds, and on the straight way to its first
     /// point from a pose where one is given, begun where it stays farthest from them.
     ///
@@ -207,7 +207,7 @@ impl Blend {
     }
 }
 
-impl Use {
+impl ChannelUse {
     /// What is bounded, and of what.
     fn what(&self) -> String {
         format!("{} of {}", self.channel.quantity.name(), self.channel.name)
@@ -225,17 +225,17 @@ impl Use {
 }
 
 /// The same channels along two motions.
-pub(super) fn joined(one: Vec<Use>, other: Vec<Use>) -> Vec<Use> {
+pub(super) fn joined(one: Vec<ChannelUse>, other: Vec<ChannelUse>) -> Vec<ChannelUse> {
     let pairs = one.into_iter().zip(other);
     pairs.map(|(a, b)| a.joined(b)).collect()
 }
 
 /// The largest share of several channels, 0 where there are none.
-pub fn worst(uses: &[Use]) -> f64 {
+pub fn worst(uses: &[ChannelUse]) -> f64 {
     uses.iter().fold(0.0, |most, u| most.max(u.share))
 }
 
-fn gathered(channel: &BoundedQuantity, most: Peak, least: Peak) -> Use {
+fn gathered(channel: &BoundedQuantity, most: FunctionPeak, least: FunctionPeak) -> ChannelUse {
     // least is the peak of the negative
     let upper = channel.used(most.bound);
     let lower = channel.used(-least.bound);
@@ -248,7 +248,7 @@ fn gathered(channel: &BoundedQuantity, most: Peak, least: Peak) -> Use {
     } else {
         (lower, least.t)
     };
-    Use {
+    ChannelUse {
         channel: channel.clone(),
         range: [-least.value, most.value],
         share,
@@ -256,7 +256,7 @@ fn gathered(channel: &BoundedQuantity, most: Peak, least: Peak) -> Use {
     }
 }
 
-fn of_polynomial(channel: &BoundedQuantity, order: usize, series: &Series) -> Use {
+fn of_polynomial(channel: &BoundedQuantity, order: usize, series: &Series) -> ChannelUse {
     let i = channel.index;
     let curvature = Some(series.derivative_bound(i, order as i32 + 2));
     let (period, parts) = (series.period(), 8 * series.harmonics().max(1));
@@ -277,7 +277,7 @@ fn of_path(
     [from, to]: [f64; 2],
     parts: usize,
     tolerance: f64,
-) -> Vec<Use> {
+) -> Vec<ChannelUse> {
     let mut state = State::EMPTY;
     let mut grid = vec![Vec::with_capacity(parts + 1); channels.len()];
     for m in 0..=parts {
@@ -311,7 +311,7 @@ fn with_band(
     channel: &BoundedQuantity,
     k: &Kinematics,
     reached: bool,
-    quantities: &Quantities,
+    quantities: &BoundQuantities,
 ) -> (f64, f64) {
     match channel.quantity.derivative() {
         Some(order) => ([k.x, k.xd, k.xdd][order][channel.index], 0.0),

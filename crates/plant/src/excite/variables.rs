@@ -8,7 +8,7 @@ const UNIT_OF_SPAN: f64 = 0.05;
 
 /// A map from search variables to a series: per coordinate a free offset in half spans, then a and b in speed limits.
 #[derive(Debug, Clone)]
-pub(super) struct Variables {
+pub(super) struct DesignVariables {
     pub fundamental: f64,
     pub harmonics: usize,
     /// Offset per coordinate that the search must keep.
@@ -19,7 +19,7 @@ pub(super) struct Variables {
     pub speed: Vec<f64>,
 }
 
-impl Variables {
+impl DesignVariables {
     /// Scales from limits; without one of speed, that which crosses the span within a period of the highest harmonic.
     pub fn new(
         channels: &[BoundedQuantity],

@@ -3,24 +3,24 @@
 use rand::RngExt;
 
 use super::SimulateError;
-use super::chance::{Purpose, stream};
-use super::effects::{EffectSpec, EffectValue, Effects, Sites};
+use super::chance::{ChancePurpose, stream};
+use super::effects::{EffectSpec, EffectValue, PlantEffects, RobotSites};
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
 use super::plant::Plant;
-use super::reference::{Fourier, Path, Reference, ReferenceFrame};
-use super::run::{MotorInput, Start, run};
+use super::reference::{FourierReference, Path, Reference, ReferenceFrame};
+use super::run::{MotionStart, MotorInput, run};
 use super::settings::Settings;
 use super::simulated_run::SimulatedRun;
 use cft_ident_core::robot::Robot;
-use cft_ident_core::robot::cft::actuation::Setup;
-use cft_ident_core::robot::cft::{PRINTED, Structure, practice};
+use cft_ident_core::robot::cft::actuation::LaboratorySetup;
+use cft_ident_core::robot::cft::{PRINTED, ParameterStructure, practice};
 use cft_ident_core::robot::friction::DoubleTanh;
 
 /// The true parameters of a simulated CFT robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CftTruth {
-    pub setup: Setup,
+    pub setup: LaboratorySetup,
     /// theta_1..theta_12, then the ten base parameters that the printed structure lacks, as `robot::cft::EXTENDED`.
     pub theta: [f64; 22],
     /// Friction of q1, q2, q4, q5 (theta_13..theta_32).
@@ -32,7 +32,7 @@ const DRAWS: usize = 1000;
 
 impl CftTruth {
     /// The synthetic robot that the built-in campaign simulates.
-    pub fn synthetic(setup: Setup) -> Self {
+    pub fn synthetic(setup: LaboratorySetup) -> Self {
         let mut theta = [0.0; 22];
         theta[..12].copy_from_slice(&practice::INERTIA);
         Self {
@@ -48,7 +48,7 @@ impl CftTruth {
     /// # Errors
     /// [`SimulateError::NotPositiveDefinite`] when no draw of a thousand is.
     pub fn varied(&self, spread: f64, seed: u64) -> Result<Self, SimulateError> {
-        let mut chance = stream(seed, Purpose::Plant);
+        let mut chance = stream(seed, ChancePurpose::Plant);
         let mut draw = || {
             let mut near = |x: f64| x * (1.0 + spread * chance.random_range(-1.0..=1.0));
             let mut drawn = *self;
@@ -69,8 +69,8 @@ impl CftTruth {
     pub fn plant(&self) -> Result<Plant<4>, SimulateError> {
         let printed = self.theta[PRINTED..].iter().all(|x| *x == 0.0);
         let (structure, count) = match printed {
-            true => (Structure::Printed12, PRINTED),
-            false => (Structure::Full22, self.theta.len()),
+            true => (ParameterStructure::Printed12, PRINTED),
+            false => (ParameterStructure::Full22, self.theta.len()),
         };
         let mechanism = Mechanism::new(Robot::cft(self.setup, structure))?;
         let law = |j: usize, _| SmoothFriction::DoubleTanh(self.friction[j]);
@@ -89,21 +89,21 @@ impl CftTruth {
 }
 
 /// The CFT robot on a set-up, with the limits of Table 5.
-pub fn mechanism(setup: Setup) -> Result<Mechanism<4>, SimulateError> {
-    Mechanism::new(Robot::cft(setup, Structure::Printed12))
+pub fn mechanism(setup: LaboratorySetup) -> Result<Mechanism<4>, SimulateError> {
+    Mechanism::new(Robot::cft(setup, ParameterStructure::Printed12))
 }
 
 /// The Table 3 run on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
-pub fn excitation(setup: Setup) -> Reference<4> {
-    excitation_of(Fourier::of(&practice::of(setup).excitation))
+pub fn excitation(setup: LaboratorySetup) -> Reference<4> {
+    excitation_of(FourierReference::of(&practice::of(setup).excitation))
 }
 
 /// [`excitation`], begun anywhere in its period.
-pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
-    excitation_of(Fourier::of(&practice::of(setup).excitation).at_random_phase(seed))
+pub fn excitation_at_random_phase(setup: LaboratorySetup, seed: u64) -> Reference<4> {
+    excitation_of(FourierReference::of(&practice::of(setup).excitation).at_random_phase(seed))
 }
 
-fn excitation_of(series: Fourier<4>) -> Reference<4> {
+fn excitation_of(series: FourierReference<4>) -> Reference<4> {
     let (frame, path) = (ReferenceFrame::Motors, Path::Fourier(series));
     Reference { frame, path }
 }
@@ -112,8 +112,8 @@ fn excitation_of(series: Fourier<4>) -> Reference<4> {
 pub fn effects(
     truth: &CftTruth,
     specs: &[EffectSpec],
-) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
-    Effects::build(specs, &Sites::of(&truth.plant()?)?)
+) -> Result<(PlantEffects, Vec<EffectValue>), SimulateError> {
+    PlantEffects::build(specs, &RobotSites::of(&truth.plant()?)?)
 }
 
 /// Runs a reference with the default gains, from the settled start.
@@ -125,10 +125,10 @@ pub fn follow(
 ) -> Result<SimulatedRun<4>, SimulateError> {
     let plant = truth.plant()?;
     plant.check()?;
-    let (effects, _) = Effects::build(specs, &Sites::of(&plant)?)?;
+    let (effects, _) = PlantEffects::build(specs, &RobotSites::of(&plant)?)?;
     let control = plant.control();
     let drive = MotorInput::Follow { reference, control };
-    run(&plant, effects, &Start::Settled, &drive, settings)
+    run(&plant, effects, &MotionStart::Settled, &drive, settings)
 }
 
 #[cfg(test)]
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn synthetic_robots_are_physical_and_varied_ones_stay_within_the_spread() {
-        for setup in [Setup::Tuedacs, Setup::Dspace] {
+        for setup in [LaboratorySetup::Tuedacs, LaboratorySetup::Dspace] {
             let nominal = CftTruth::synthetic(setup);
             nominal.check().expect("positive definite");
             for seed in 0..20 {
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn impossible_inertia_is_refused_with_the_pose() {
-        let mut truth = CftTruth::synthetic(Setup::Tuedacs);
+        let mut truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
         truth.theta[11] = -5.0;
         let refused = truth.check();
         assert!(matches!(
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn cft_parameters_carry_the_numbers_of_the_report() {
-        let truth = CftTruth::synthetic(Setup::Tuedacs);
+        let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
         assert_eq!(truth.friction_theta(), practice::FRICTION);
         assert_eq!(truth.printed(), practice::INERTIA);
         let parameters = truth.plant().expect("a pose").parameters();

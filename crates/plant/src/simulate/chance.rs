@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// What chance is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Purpose {
+pub enum ChancePurpose {
     /// Parameters of a plant that vary from study to study.
     Plant = 1,
     /// Order and start phase of a reference.
@@ -29,14 +29,14 @@ pub enum Purpose {
 const STREAMS_PER_PURPOSE: u64 = 1 << 32;
 
 /// Generator of the given purpose.
-pub fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
+pub fn stream(seed: u64, purpose: ChancePurpose) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(purpose as u64);
     generator
 }
 
 /// Generator of the given purpose for one of several things, such as joints.
-pub(super) fn stream_of(seed: u64, purpose: Purpose, number: usize) -> ChaCha8Rng {
+pub(super) fn stream_of(seed: u64, purpose: ChancePurpose, number: usize) -> ChaCha8Rng {
     let mut generator = stream(seed, purpose);
     generator.set_stream(purpose as u64 + STREAMS_PER_PURPOSE * (number as u64 + 1));
     generator

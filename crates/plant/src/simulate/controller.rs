@@ -37,13 +37,13 @@ impl<const J: usize> ControllerSettings<J> {
 }
 
 /// The last sample of the controller, and the filtered speeds; none before the first.
-pub(super) type Memory<const J: usize> = Option<(f64, [f64; J], [f64; J])>;
+pub(super) type ControllerMemory<const J: usize> = Option<(f64, [f64; J], [f64; J])>;
 
 impl<const J: usize> ControllerSettings<J> {
     /// Volts, not yet limited, at time t for the measured coordinates x and what is wanted.
     pub(super) fn volts(
         &self,
-        memory: &mut Memory<J>,
+        memory: &mut ControllerMemory<J>,
         t: f64,
         x: &[f64; J],
         target: &Target<J>,

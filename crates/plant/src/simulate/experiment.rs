@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use super::SimulateError;
 use super::controller::ControllerSettings;
 use super::mechanism::Mechanism;
-use super::one_joint::{Mover, OneJointMove};
+use super::one_joint::{MovedAxis, OneJointMove};
 use super::plant::Plant;
-use super::reference::{Fourier, Path, Points, Reference, ReferenceFrame};
-use cft_ident_files::config::trajectory::{self, Coordinates, Trajectory};
+use super::reference::{FourierReference, Path, Reference, ReferenceFrame, SplineReference};
+use cft_ident_files::config::trajectory::{self, Trajectory, TrajectoryCoordinates};
 
 /// Duration of a motion that sets none \[s\].
 pub const SECONDS: f64 = 20.0;
@@ -51,7 +51,7 @@ impl<'a> Experiment<'a> {
         Ok(match *self {
             Self::Usual => Some(usual(mechanism, &ladder)?),
             Self::OneJoint { joint, part } => {
-                ladder.mover = Mover::named(&mechanism.robot, joint)?;
+                ladder.mover = MovedAxis::named(&mechanism.robot, joint)?;
                 ladder.part = part;
                 Some(ladder.reference(mechanism)?)
             }
@@ -69,7 +69,7 @@ pub(crate) fn of_file<const J: usize>(
     seed: u64,
 ) -> Result<Reference<J>, SimulateError> {
     let frame = |coordinates| match coordinates {
-        Coordinates::Cartesian if !mechanism.motors_at_joints() => ReferenceFrame::Motors,
+        TrajectoryCoordinates::Cartesian if !mechanism.motors_at_joints() => ReferenceFrame::Motors,
         _ => ReferenceFrame::Joints,
     };
     match file {
@@ -95,13 +95,13 @@ fn fourier<const J: usize>(
     };
     let terms = file.series.iter().map(|series| series.a.len());
     let terms = terms.max().unwrap_or(0);
-    let mut series = Fourier {
+    let mut series = FourierReference {
         offset: rest,
         a: vec![[0.0; J]; terms],
         b: vec![[0.0; J]; terms],
         fundamental: TAU * file.fundamental_hz,
         start: file.start_s.unwrap_or(0.0),
-        blend: file.blend_s.unwrap_or(Fourier::<J>::BLEND),
+        blend: file.blend_s.unwrap_or(FourierReference::<J>::BLEND),
         periods: file.periods,
     };
     for coordinate in &file.series {
@@ -131,7 +131,7 @@ fn points<const J: usize>(
         };
         list.push((point.t - first, pose));
     }
-    let path = Path::Points(Points::new(&list)?);
+    let path = Path::Points(SplineReference::new(&list)?);
     Ok(Reference { frame, path })
 }
 
@@ -141,7 +141,10 @@ fn usual<const J: usize>(
     ladder: &OneJointMove,
 ) -> Result<Reference<J>, SimulateError> {
     let (frame, series) = match &mechanism.practice {
-        Some(practice) => (ReferenceFrame::Motors, Fourier::of(&practice.excitation)),
+        Some(practice) => (
+            ReferenceFrame::Motors,
+            FourierReference::of(&practice.excitation),
+        ),
         None if mechanism.joints() == 1 => return ladder.reference(mechanism),
         None => (ReferenceFrame::Joints, all_joints(mechanism)),
     };
@@ -150,7 +153,7 @@ fn usual<const J: usize>(
 }
 
 /// All joints over most of their travel, each with phases of its own.
-fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Fourier<J> {
+fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> FourierReference<J> {
     let (mut a, mut b) = (vec![[0.0; J]; HARMONICS], vec![[0.0; J]; HARMONICS]);
     let sum: f64 = (1..=HARMONICS).map(|k| 1.0 / k as f64).sum();
     for k in 0..HARMONICS {
@@ -162,13 +165,13 @@ fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Fourier<J> {
             b[k][j] = amplitude * phase.sin();
         }
     }
-    Fourier {
+    FourierReference {
         offset: mechanism.middle(),
         a,
         b,
         fundamental: TAU * FUNDAMENTAL_HZ,
         start: 0.0,
-        blend: Fourier::<J>::BLEND,
+        blend: FourierReference::<J>::BLEND,
         periods: None,
     }
 }

@@ -13,7 +13,7 @@
 use super::SimulateError;
 
 /// First-order differential equation with a state of N numbers.
-pub trait System<const N: usize> {
+pub trait OdeSystem<const N: usize> {
     /// Time derivative of the state at time `t` \[s\].
     fn rates(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]);
 
@@ -25,14 +25,14 @@ pub trait System<const N: usize> {
 
 /// Tolerances of one step, the same for all components: error <= absolute + relative |y|.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tolerance {
+pub struct StepTolerance {
     /// In the unit of the component (m, rad, m/s, rad/s).
     pub absolute: f64,
     /// Fraction of the component.
     pub relative: f64,
 }
 
-impl Default for Tolerance {
+impl Default for StepTolerance {
     /// Three orders below the encoders' resolution; halving it moves positions by less than 1e-10
     /// over 20 s (tests/simulate_integration.rs).
     fn default() -> Self {
@@ -43,7 +43,7 @@ impl Default for Tolerance {
     }
 }
 
-impl Tolerance {
+impl StepTolerance {
     /// Both tolerances times `factor`.
     pub fn scaled(self, factor: f64) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl Tolerance {
 /// The integrator: tolerances and the step length that it carries from call to call.
 #[derive(Debug, Clone)]
 pub struct DormandPrince {
-    tolerance: Tolerance,
+    tolerance: StepTolerance,
     step: f64,
     previous_error: f64,
 }
@@ -110,7 +110,7 @@ const MOST_STEPS: u64 = 200_000;
 
 impl DormandPrince {
     /// Integrator with the given tolerances; the first step length is found by trial.
-    pub fn new(tolerance: Tolerance) -> Self {
+    pub fn new(tolerance: StepTolerance) -> Self {
         Self {
             tolerance,
             step: f64::INFINITY,
@@ -122,7 +122,7 @@ impl DormandPrince {
     ///
     /// # Errors
     /// [`SimulateError::Diverged`] when no step is short enough, or 200 000 do not reach the end.
-    pub fn advance<const N: usize, S: System<N>>(
+    pub fn advance<const N: usize, S: OdeSystem<N>>(
         &mut self,
         system: &mut S,
         from: f64,
@@ -168,7 +168,7 @@ impl DormandPrince {
 
     /// One trial step: the fifth-order solution and its error over the tolerance (root mean square).
     #[inline]
-    fn attempt<const N: usize, S: System<N>>(
+    fn attempt<const N: usize, S: OdeSystem<N>>(
         &self,
         system: &S,
         t: f64,
@@ -200,7 +200,7 @@ impl DormandPrince {
 
 /// State y + h sum(weights k) at the given node, with its rates stored behind the stages used.
 #[inline(always)]
-fn stage<const N: usize, const S: usize, T: System<N>>(
+fn stage<const N: usize, const S: usize, T: OdeSystem<N>>(
     system: &T,
     t: f64,
     h: f64,
@@ -224,7 +224,7 @@ fn stage<const N: usize, const S: usize, T: System<N>>(
 mod tests {
     use super::*;
 
-    impl<const N: usize, F: Fn(&[f64; N]) -> [f64; N]> System<N> for F {
+    impl<const N: usize, F: Fn(&[f64; N]) -> [f64; N]> OdeSystem<N> for F {
         fn rates(&self, _t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
             *dydt = self(y);
         }
@@ -239,7 +239,7 @@ mod tests {
         passed: bool,
     }
 
-    impl System<1> for Latch {
+    impl OdeSystem<1> for Latch {
         fn rates(&self, _t: f64, _y: &[f64; 1], dydt: &mut [f64; 1]) {
             dydt[0] = if self.passed { 2.0 } else { 1.0 };
         }
@@ -251,7 +251,7 @@ mod tests {
         }
     }
 
-    fn oscillate(tolerance: Tolerance) -> f64 {
+    fn oscillate(tolerance: StepTolerance) -> f64 {
         let mut integrator = DormandPrince::new(tolerance);
         let mut y = [1.0, 0.0];
         for k in 0..10 {
@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn oscillator_error_follows_the_tolerance() {
-        let loose = Tolerance {
+        let loose = StepTolerance {
             absolute: 1e-6,
             relative: 0.0,
         };
@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn fifth_order_shows_when_the_step_is_halved() {
         let step = |h: f64| {
-            let integrator = DormandPrince::new(Tolerance::default());
+            let integrator = DormandPrince::new(StepTolerance::default());
             let mut k = [[0.0; 2]; 7];
             let y = [1.0, 0.0];
             k[0] = oscillator(&y);
@@ -288,7 +288,7 @@ mod tests {
 
     #[test]
     fn memory_that_changes_the_rates_is_seen_by_the_next_step() {
-        let mut integrator = DormandPrince::new(Tolerance::default());
+        let mut integrator = DormandPrince::new(StepTolerance::default());
         let mut latch = Latch { passed: false };
         let mut y = [0.0];
         for k in 0..10 {
@@ -301,7 +301,7 @@ mod tests {
 
     #[test]
     fn finite_time_explosion_is_an_error_and_not_a_hang() {
-        let mut integrator = DormandPrince::new(Tolerance::default());
+        let mut integrator = DormandPrince::new(StepTolerance::default());
         let mut explosion = |y: &[f64; 1]| [y[0] * y[0]];
         let outcome = integrator.advance(&mut explosion, 0.0, 2.0, &mut [1.0]);
         let Err(SimulateError::Diverged { t }) = outcome else {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::SimulateError;
-use cft_ident_core::robot::practice::Practice;
+use cft_ident_core::robot::practice::OperatingDefaults;
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::robot_file::CoordinateLimits;
@@ -24,7 +24,7 @@ pub struct Mechanism<const J: usize> {
     /// Torque per volt where the motors are at the joints and their amplifiers are known; else 1.
     pub gain: [f64; J],
     /// How it is run, where more is known than its file says.
-    pub practice: Option<Practice>,
+    pub practice: Option<OperatingDefaults>,
     /// `[limits]` of the file, by name.
     pub given: BTreeMap<String, CoordinateLimits>,
 }

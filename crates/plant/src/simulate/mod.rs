@@ -49,20 +49,20 @@ pub mod wrist;
 
 pub use cft::CftTruth;
 pub use controller::ControllerSettings;
-pub use effects::{EffectSpec, Effects};
+pub use effects::{EffectSpec, PlantEffects};
 pub use error::SimulateError;
 pub use experiment::Experiment;
 pub use joint_friction::SmoothFriction;
 pub use mechanism::Mechanism;
-pub use one_joint::{Mover, OneJointMove};
+pub use one_joint::{MovedAxis, OneJointMove};
 pub use order::{
     InitialConditions, Order, Rows, SimulatedLog, SimulationSummary, simulate, simulate_from,
     simulate_rows,
 };
 pub use plant::Plant;
 pub use reference::{Path, Reference, ReferenceFrame};
-pub use run::{MotorInput, Start, run};
-pub use sensors::{Noise, Sensors};
+pub use run::{MotionStart, MotorInput, run};
+pub use sensors::{Noise, PlantSensors};
 pub use settings::Settings;
 pub use simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 pub use single_joint::SingleJointTruth;

@@ -2,22 +2,22 @@
 //!
 //! Its state is (q, v, z): z are the states of the effects.
 
-use super::effects::{Effect, Effects, PlantState};
-use super::integrate::System;
+use super::effects::{Effect, PlantEffects, PlantState};
+use super::integrate::OdeSystem;
 use super::plant::{Plant, gather, spread};
 
 /// A plant with its effects, its volts those of the last control sample (zero-order hold).
 ///
 /// N is at least 2 J plus the number of the effects' states.
 #[derive(Debug)]
-pub struct Moving<'a, const J: usize> {
+pub struct MovingPlant<'a, const J: usize> {
     pub plant: &'a Plant<J>,
-    pub effects: Effects,
+    pub effects: PlantEffects,
     pub volts: [f64; J],
 }
 
 /// The motor's side of the joints and what the balance of torques came to.
-struct Balance<const J: usize> {
+struct TorqueBalance<const J: usize> {
     q: [f64; J],
     v: [f64; J],
     friction: [f64; J],
@@ -26,7 +26,7 @@ struct Balance<const J: usize> {
     acceleration: [f64; J],
 }
 
-impl<const J: usize> Moving<'_, J> {
+impl<const J: usize> MovingPlant<'_, J> {
     /// Positions and speeds of the motors and their encoders: beyond the links by the deflections of elastic joints.
     pub(super) fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
         let (mut q, mut v) = (*q, *v);
@@ -51,7 +51,7 @@ impl<const J: usize> Moving<'_, J> {
     }
 
     /// The balance with effects; where a joint is elastic the load tau_l is what the spring passes on.
-    fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> Balance<J> {
+    fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> TorqueBalance<J> {
         let (q, v) = self.motor_side(link, speed, z);
         let (n, friction) = (self.plant.joints(), self.plant.friction(&v));
         let motion = PlantState {
@@ -87,7 +87,7 @@ impl<const J: usize> Moving<'_, J> {
         };
         let taken = self.implicit(&respond, &motion);
         let (net, _, acceleration) = respond(&taken);
-        Balance {
+        TorqueBalance {
             q,
             v,
             friction,
@@ -213,7 +213,7 @@ impl<const J: usize> Moving<'_, J> {
     }
 }
 
-impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
+impl<const J: usize, const N: usize> OdeSystem<N> for MovingPlant<'_, J> {
     #[inline]
     fn rates(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
         dydt[..J].copy_from_slice(&y[J..2 * J]);

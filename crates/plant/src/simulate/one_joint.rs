@@ -3,7 +3,8 @@
 use super::SimulateError;
 use super::mechanism::Mechanism;
 use super::reference::{
-    LadderPlan, LadderReference, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
+    JointTravel, LadderPlan, LadderReference, Path, Reference, ReferenceFrame, TURN, middle_part,
+    travel,
 };
 use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::Robot;
@@ -20,14 +21,14 @@ const STROKES: f64 = 8.0;
 
 /// What moves in a one-joint experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mover {
+pub enum MovedAxis {
     /// A joint, by its index.
     Joint(usize),
     /// A motor's coordinate, by its index; on the CFT robot q4 and q5 move together with x_c1 and x_c2.
     Motor(usize),
 }
 
-impl Mover {
+impl MovedAxis {
     /// The joint or motor's coordinate of that name.
     pub fn named(robot: &Robot, name: &str) -> Result<Self, SimulateError> {
         let mut known = robot.joint_names().to_vec();
@@ -59,7 +60,7 @@ impl Mover {
 /// One joint moves over its range at a ladder of speeds, the others are commanded to hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OneJointMove {
-    pub mover: Mover,
+    pub mover: MovedAxis,
     /// Range of the mover, m or rad; what the limits leave with a margin, the others in their middle, where absent.
     pub range: Option<(f64, f64)>,
     /// Middle part of the range that the limits leave; all of it, 1, unless asked for.
@@ -80,7 +81,7 @@ impl OneJointMove {
     /// The default ladder of a joint.
     pub fn new(joint: usize, seconds: f64, seed: Option<u64>) -> Self {
         Self {
-            mover: Mover::Joint(joint),
+            mover: MovedAxis::Joint(joint),
             range: None,
             part: 1.0,
             speeds: None,
@@ -99,7 +100,7 @@ impl OneJointMove {
         seed: u64,
     ) -> Result<Self, SimulateError> {
         Ok(Self {
-            mover: Mover::named(robot, &file.joint)?,
+            mover: MovedAxis::named(robot, &file.joint)?,
             range: file.range.map(|[low, high]| (low, high)),
             speeds: Some(file.speeds.clone()),
             acceleration: file.acceleration,
@@ -150,7 +151,7 @@ impl OneJointMove {
         Ok(self.within(&self.room(mechanism)?.2))
     }
 
-    fn within(&self, room: &Travel) -> (f64, f64) {
+    fn within(&self, room: &JointTravel) -> (f64, f64) {
         self.range.unwrap_or(middle_part(room.range, self.part))
     }
 
@@ -158,19 +159,19 @@ impl OneJointMove {
     fn room<const J: usize>(
         &self,
         m: &Mechanism<J>,
-    ) -> Result<(ReferenceFrame, [f64; J], Travel), SimulateError> {
+    ) -> Result<(ReferenceFrame, [f64; J], JointTravel), SimulateError> {
         let (place, middle) = (self.mover.index(), m.middle());
         let speeds = match &m.practice {
             Some(practice) => m.filled(|i| practice.speeds[i]),
             None => [f64::INFINITY; J],
         };
-        if let (Mover::Joint(_), false) = (self.mover, m.motors_at_joints()) {
+        if let (MovedAxis::Joint(_), false) = (self.mover, m.motors_at_joints()) {
             let pose = m.pose(&middle)?;
             let room = travel(m, &pose, place, MARGIN, &speeds)?;
             return Ok((ReferenceFrame::Joints, pose, room));
         }
         let gap = MARGIN * (m.upper[place] - m.lower[place]);
-        let room = Travel {
+        let room = JointTravel {
             range: (m.lower[place] + gap, m.upper[place] - gap),
             top_speed: speeds[place],
         };
@@ -183,8 +184,8 @@ impl OneJointMove {
             return Err(SimulateError::reference(what.remedy(remedy)));
         }
         let frame = match self.mover {
-            Mover::Joint(_) => ReferenceFrame::Joints,
-            Mover::Motor(_) => ReferenceFrame::Motors,
+            MovedAxis::Joint(_) => ReferenceFrame::Joints,
+            MovedAxis::Motor(_) => ReferenceFrame::Motors,
         };
         Ok((frame, middle, room))
     }
@@ -193,13 +194,13 @@ impl OneJointMove {
         &self,
         m: &Mechanism<J>,
         range: (f64, f64),
-        room: &Travel,
+        room: &JointTravel,
     ) -> Result<LadderReference, SimulateError> {
         let place = self.mover.index();
         let given = m.given.get(&self.mover.name(&m.robot));
         let of_practice = m.practice.as_ref().map(|practice| match self.mover {
-            Mover::Joint(_) => practice.joint_ladders[place],
-            Mover::Motor(_) => practice.coordinate_ladders[place],
+            MovedAxis::Joint(_) => practice.joint_ladders[place],
+            MovedAxis::Motor(_) => practice.coordinate_ladders[place],
         });
         let whole = self.range.unwrap_or(room.range);
         let acceleration = (of_practice.map(|[_, acceleration]| acceleration))

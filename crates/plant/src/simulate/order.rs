@@ -4,14 +4,14 @@ use cft_ident_core::explain::ErrorText;
 use std::ops::ControlFlow;
 
 use super::SimulateError;
-use super::effects::{EffectSpec, EffectValue, Effects, Sites};
+use super::effects::{EffectSpec, EffectValue, PlantEffects, RobotSites};
 use super::experiment::{Experiment, SECONDS};
 use super::log_layout::LogLayout;
 use super::mechanism::Mechanism;
 use super::plant::Plant;
-use super::recorder::{Recorder, Waiting};
+use super::recorder::{LogRecorder, RowSpool};
 use super::reference::Path;
-use super::run::{MotorInput, Start, run_in_blocks};
+use super::run::{MotionStart, MotorInput, run_in_blocks};
 use super::settings_file;
 use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 use super::temperature::PlantTemperatures;
@@ -91,7 +91,10 @@ pub struct InitialConditions {
 }
 
 impl InitialConditions {
-    fn start<const J: usize>(&self, mechanism: &Mechanism<J>) -> Result<Start<J>, SimulateError> {
+    fn start<const J: usize>(
+        &self,
+        mechanism: &Mechanism<J>,
+    ) -> Result<MotionStart<J>, SimulateError> {
         let of = |numbers: &[f64]| {
             let widened = mechanism.widened(numbers, 0.0);
             widened.ok_or(SimulateError::Parameter {
@@ -100,14 +103,14 @@ impl InitialConditions {
                 rule: "must be one per motor",
             })
         };
-        Ok(Start::State {
+        Ok(MotionStart::State {
             position: of(&self.position)?,
             speed: of(&self.speed)?,
         })
     }
 }
 
-/// Simulates what is ordered, from the settled start ([`Start::Settled`]).
+/// Simulates what is ordered, from the settled start ([`MotionStart::Settled`]).
 ///
 /// # Errors
 /// [`SimulateError`]; reaching a limit is none.
@@ -176,9 +179,9 @@ fn run_order<const J: usize>(
     let plant = Plant::<J>::of(order.robot, order.model)?;
     let declared = &order.robot.sensors.temperature;
     let warm = PlantTemperatures::of(declared, plant.mechanism.robot.joint_names());
-    let sites = Sites {
+    let sites = RobotSites {
         temperatures: warm.clone(),
-        ..Sites::of(&plant)?
+        ..RobotSites::of(&plant)?
     };
     let (effects, effect_values) = built_effects(order, &sites)?;
     let mechanism = &plant.mechanism;
@@ -190,12 +193,12 @@ fn run_order<const J: usize>(
     // before a ladder of that length is built
     settings.samples(in_memory)?;
     let (drive, own_seconds) = drive(order, &plant)?;
-    let start = initial.map_or(Ok(Start::Settled), |given| given.start(mechanism))?;
+    let start = initial.map_or(Ok(MotionStart::Settled), |given| given.start(mechanism))?;
     settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
     settings.samples(in_memory)?;
 
-    let mut recorder = Recorder::new(&settings.sensors, settings.seed);
-    let mut waiting = Waiting::new(mechanism.joints());
+    let mut recorder = LogRecorder::new(&settings.sensors, settings.seed);
+    let mut waiting = RowSpool::new(mechanism.joints());
     let block = (!in_memory).then_some(BLOCK);
     let (mut run, effects) = run_in_blocks(
         &plant,
@@ -288,8 +291,8 @@ fn drive<const J: usize>(
 /// Effects of the model, then those of the order.
 fn built_effects(
     order: &Order,
-    sites: &Sites,
-) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
+    sites: &RobotSites,
+) -> Result<(PlantEffects, Vec<EffectValue>), SimulateError> {
     let mut asked = Vec::new();
     if let Some((file, model)) = order.model {
         for (place, effect) in model.effects.iter().enumerate() {
@@ -302,7 +305,7 @@ fn built_effects(
             }
             .or_own(&model.candidates);
             // Tried alone, so that what is wrong with it is said of the file and not of the command line.
-            Effects::build(std::slice::from_ref(&spec), sites).map_err(|source| {
+            PlantEffects::build(std::slice::from_ref(&spec), sites).map_err(|source| {
                 SimulateError::ModelEffect {
                     file: file.to_owned(),
                     number: place + 1,
@@ -314,7 +317,7 @@ fn built_effects(
         }
     }
     asked.extend(order.effects.iter().cloned());
-    let (effects, values) = Effects::build(&asked, sites)?;
+    let (effects, values) = PlantEffects::build(&asked, sites)?;
     let joint_channels = order.robot.layout().channels == DeclaredChannels::Joint;
     match effects.first_fault() {
         Some(fault) if !joint_channels => Err(SimulateError::EffectPlace {

@@ -7,7 +7,7 @@ use super::SimulateError;
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
 use cft_ident_core::explain::ErrorText;
-use cft_ident_core::robot::dynamics::Dynamics;
+use cft_ident_core::robot::dynamics::RobotDynamics;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::robot_file::{FrictionLawKind, RobotFile};
 use cft_ident_files::config::{ConfigError, ModelFile};
@@ -21,7 +21,7 @@ const GRIDDED: usize = 3;
 #[derive(Debug, Clone)]
 pub struct Plant<const J: usize> {
     pub mechanism: Mechanism<J>,
-    dynamics: Dynamics,
+    dynamics: RobotDynamics,
     /// Friction and constant torque that the motors supply beside load and friction, per joint.
     pub laws: Vec<SmoothFriction>,
     pub offset: [f64; J],

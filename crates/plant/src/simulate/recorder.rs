@@ -9,27 +9,31 @@ use rand_chacha::ChaCha8Rng;
 use tempfile::SpooledTempFile;
 
 use super::SimulateError;
-use super::chance::{Purpose, stream};
-use super::effects::Effects;
+use super::chance::{ChancePurpose, stream};
+use super::effects::PlantEffects;
 use super::mechanism::Mechanism;
-use super::sensors::{MeanSquare, Sensors, disturb};
+use super::sensors::{MeanSquare, PlantSensors, disturb};
 use super::simulated_run::{MotorStatus, SimulatedRun};
 
 /// Bytes that wait in memory; what is more waits in a file of the system's temporary folder.
 const IN_MEMORY: usize = 64 << 20;
 
 /// Puts the noise, the faults and the gaps into the rows of one log, block by block.
-pub(super) struct Recorder<'a, const J: usize> {
-    sensors: &'a Sensors<J>,
+pub(super) struct LogRecorder<'a, const J: usize> {
+    sensors: &'a PlantSensors<J>,
     volts: MeanSquare<J>,
     torque: MeanSquare<J>,
     /// Chance of the volts, of the torques, of the lost rows.
     chance: [ChaCha8Rng; 3],
 }
 
-impl<'a, const J: usize> Recorder<'a, J> {
-    pub fn new(sensors: &'a Sensors<J>, seed: u64) -> Self {
-        let purposes = [Purpose::Volts, Purpose::Torque, Purpose::Dropout];
+impl<'a, const J: usize> LogRecorder<'a, J> {
+    pub fn new(sensors: &'a PlantSensors<J>, seed: u64) -> Self {
+        let purposes = [
+            ChancePurpose::Volts,
+            ChancePurpose::Torque,
+            ChancePurpose::Dropout,
+        ];
         Self {
             sensors,
             volts: MeanSquare::new(),
@@ -50,7 +54,7 @@ impl<'a, const J: usize> Recorder<'a, J> {
         &mut self,
         rows: &mut SimulatedRun<J>,
         mechanism: &Mechanism<J>,
-        effects: &Effects,
+        effects: &PlantEffects,
     ) {
         rows.volt_noise = self.sensors.volt_noise.of_rms(self.volts.root());
         rows.torque_noise = self.sensors.torque_noise.of_rms(self.torque.root());
@@ -70,13 +74,13 @@ impl<'a, const J: usize> Recorder<'a, J> {
 }
 
 /// Perfect rows that wait, as numbers in the order t, and per joint x, volts, q, torque, speed, status.
-pub(super) struct Waiting {
+pub(super) struct RowSpool {
     file: BufWriter<SpooledTempFile>,
     joints: usize,
     rows: u64,
 }
 
-impl Waiting {
+impl RowSpool {
     pub fn new(joints: usize) -> Self {
         Self {
             file: BufWriter::new(SpooledTempFile::new(IN_MEMORY)),
@@ -104,10 +108,10 @@ impl Waiting {
     }
 
     /// The rows again, from the first on.
-    pub fn rewind(self) -> Result<Waited, SimulateError> {
+    pub fn rewind(self) -> Result<WaitedRows, SimulateError> {
         let mut file = self.file.into_inner().map_err(|error| error.into_error())?;
         file.rewind()?;
-        Ok(Waited {
+        Ok(WaitedRows {
             file: BufReader::new(file),
             joints: self.joints,
             left: self.rows,
@@ -116,13 +120,13 @@ impl Waiting {
 }
 
 /// Rows that have waited.
-pub(super) struct Waited {
+pub(super) struct WaitedRows {
     file: BufReader<SpooledTempFile>,
     joints: usize,
     left: u64,
 }
 
-impl Waited {
+impl WaitedRows {
     /// Puts the next rows, at most `most`, in place of those of `rows`; whether there were any.
     pub fn next<const J: usize>(
         &mut self,

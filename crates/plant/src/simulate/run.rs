@@ -2,12 +2,12 @@
 
 use super::SimulateError;
 use super::controller::ControllerSettings;
-use super::effects::{Beginning, Effects};
+use super::effects::{InitialCondition, PlantEffects};
 use super::integrate::DormandPrince;
 use super::mechanism::Mechanism;
-use super::moving::{Moving, part};
+use super::moving::{MovingPlant, part};
 use super::plant::Plant;
-use super::recorder::Recorder;
+use super::recorder::LogRecorder;
 use super::reference::{Reference, ReferenceFrame, Target};
 use super::settings::Settings;
 use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
@@ -27,7 +27,7 @@ pub enum MotorInput<const J: usize> {
 
 /// Where the motion starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Start<const J: usize> {
+pub enum MotionStart<const J: usize> {
     /// On the reference, displaced by as much as the controller needs to carry the load at rest; in the
     /// middle of the limits, at rest, where no reference is followed.
     Settled,
@@ -58,15 +58,15 @@ const fn compiled(joints: usize, size: usize) -> bool {
 /// [`SimulateError`] where the settings, reference or start cannot be used, or the motion diverges.
 pub fn run<const J: usize>(
     plant: &Plant<J>,
-    effects: Effects,
-    start: &Start<J>,
+    effects: PlantEffects,
+    start: &MotionStart<J>,
     drive: &MotorInput<J>,
     settings: &Settings<J>,
 ) -> Result<SimulatedRun<J>, SimulateError> {
     settings.samples(true)?;
     let whole = &mut |_: &mut SimulatedRun<J>| Ok(());
     let (mut run, effects) = run_in_blocks(plant, effects, start, drive, settings, None, whole)?;
-    let mut recorder = Recorder::new(&settings.sensors, settings.seed);
+    let mut recorder = LogRecorder::new(&settings.sensors, settings.seed);
     recorder.hear(&run);
     recorder.measure(&mut run, &plant.mechanism, &effects);
     Ok(run)
@@ -79,19 +79,19 @@ pub(super) type HandOn<'a, const J: usize> =
 /// Runs as [`run`] does without noise, faults and losses, hands every `block` rows on and gives back the last.
 pub(super) fn run_in_blocks<const J: usize>(
     plant: &Plant<J>,
-    effects: Effects,
-    start: &Start<J>,
+    effects: PlantEffects,
+    start: &MotionStart<J>,
     drive: &MotorInput<J>,
     settings: &Settings<J>,
     block: Option<usize>,
     hand_on: HandOn<J>,
-) -> Result<(SimulatedRun<J>, Effects), SimulateError> {
+) -> Result<(SimulatedRun<J>, PlantEffects), SimulateError> {
     settings.check()?;
     if let MotorInput::Follow { reference, control } = drive {
         reference.path.check()?;
         control.check()?;
     }
-    let moving = Moving {
+    let moving = MovingPlant {
         plant,
         effects,
         volts: [0.0; J],
@@ -110,13 +110,13 @@ pub(super) fn run_in_blocks<const J: usize>(
 }
 
 fn march<const J: usize, const N: usize>(
-    mut moving: Moving<J>,
-    start: &Start<J>,
+    mut moving: MovingPlant<J>,
+    start: &MotionStart<J>,
     drive: &MotorInput<J>,
     settings: &Settings<J>,
     block: Option<usize>,
     hand_on: HandOn<J>,
-) -> Result<(SimulatedRun<J>, Effects), SimulateError> {
+) -> Result<(SimulatedRun<J>, PlantEffects), SimulateError> {
     let mechanism = &moving.plant.mechanism;
     let samples = settings.samples(false)?;
     let block = block.unwrap_or(samples);
@@ -217,26 +217,26 @@ fn limits_reached<const J: usize>(
 
 /// Joint positions, speeds and effect states at t = 0.
 fn initial_state<const J: usize, const N: usize>(
-    moving: &mut Moving<J>,
-    start: &Start<J>,
+    moving: &mut MovingPlant<J>,
+    start: &MotionStart<J>,
     drive: &MotorInput<J>,
     settings: &Settings<J>,
 ) -> Result<[f64; N], SimulateError> {
     let mechanism = &moving.plant.mechanism;
     let (lower, upper) = (&mechanism.lower, &mechanism.upper);
     let (x, q, v) = match (start, drive) {
-        (Start::State { position, speed }, _) => {
+        (MotionStart::State { position, speed }, _) => {
             let q = mechanism.pose(position)?;
             (*position, q, mechanism.joint_speeds(&q, speed)?)
         }
-        (Start::Settled, MotorInput::Volts(_)) => {
+        (MotionStart::Settled, MotorInput::Volts(_)) => {
             let middle = std::array::from_fn(|i| {
                 let middle = 0.5 * (lower[i] + upper[i]);
                 if middle.is_finite() { middle } else { 0.0 }
             });
             (middle, mechanism.pose(&middle)?, [0.0; J])
         }
-        (Start::Settled, MotorInput::Follow { reference, control }) => {
+        (MotionStart::Settled, MotorInput::Follow { reference, control }) => {
             let target = wanted(mechanism, reference, 0.0);
             settle(moving, &target, control)?
         }
@@ -250,7 +250,7 @@ fn initial_state<const J: usize, const N: usize>(
     if !moving.effects.is_empty() {
         let load = moving.load(0.0, &q, &v, &y[2 * J..]);
         let n = mechanism.joints();
-        let beginning = Beginning {
+        let beginning = InitialCondition {
             q: &q[..n],
             load: &load[..n],
             seconds: settings.seconds,
@@ -271,7 +271,7 @@ type Pose<const J: usize> = ([f64; J], [f64; J], [f64; J]);
 
 /// Pose beside the target from which the controller's volts carry the load: kp (x_d - x) = u(x).
 fn settle<const J: usize>(
-    moving: &Moving<J>,
+    moving: &MovingPlant<J>,
     target: &Target<J>,
     control: &ControllerSettings<J>,
 ) -> Result<Pose<J>, SimulateError> {

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::SimulateError;
-use super::chance::{Purpose, stream};
+use super::chance::{ChancePurpose, stream};
 
 /// White noise on a logged channel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -54,7 +54,7 @@ impl<const J: usize> Noise<J> {
 
 /// The sensors and the recorder.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensors<const J: usize> {
+pub struct PlantSensors<const J: usize> {
     /// Positions are rounded to encoder counts (Table 5).
     pub quantisation: bool,
     /// Standard deviation of the sampling instants as a fraction of the step; offsets are cut at 0.45.
@@ -67,7 +67,7 @@ pub struct Sensors<const J: usize> {
     pub torque_noise: Noise<J>,
 }
 
-impl<const J: usize> Default for Sensors<J> {
+impl<const J: usize> Default for PlantSensors<J> {
     /// Quantised encoders, everything else perfect.
     fn default() -> Self {
         Self {
@@ -80,7 +80,7 @@ impl<const J: usize> Default for Sensors<J> {
     }
 }
 
-impl<const J: usize> Sensors<J> {
+impl<const J: usize> PlantSensors<J> {
     /// No quantisation, no noise: for comparisons with the equations.
     pub fn perfect() -> Self {
         Self {
@@ -114,7 +114,7 @@ impl<const J: usize> Sensors<J> {
 
     /// Sampling instants \[s\] at the given rate, without end; the first is 0.
     pub(super) fn instants(&self, rate_hz: f64, seed: u64) -> impl Iterator<Item = f64> + use<J> {
-        let mut chance = stream(seed, Purpose::Jitter);
+        let mut chance = stream(seed, ChancePurpose::Jitter);
         let jitter = self.jitter;
         (0_u64..).map(move |k| {
             let draw: f64 = chance.sample(StandardNormal);
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn encoders_show_whole_counts_within_half_a_count() {
         let resolution = [8.7989e-6, 0.0];
-        let sensors = Sensors::default();
+        let sensors = PlantSensors::default();
         for k in 0..1000 {
             let x = 1e-6 * f64::from(k) * 1.37 - 5e-4;
             let seen = sensors.encoders(&[x, x], &resolution);
@@ -207,7 +207,11 @@ mod tests {
         assert!((deviation[0] - 0.02).abs() < 1e-12);
         assert!((deviation[1] - 0.01 * 0.5f64.sqrt()).abs() < 1e-12);
         let mut noisy = clean.clone();
-        disturb(&mut noisy, &deviation, &mut stream(5, Purpose::Torque));
+        disturb(
+            &mut noisy,
+            &deviation,
+            &mut stream(5, ChancePurpose::Torque),
+        );
         let pairs = noisy.iter().zip(&clean);
         let differences: Vec<[f64; 2]> = pairs.map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
         let measured = rms(&differences);
@@ -218,7 +222,7 @@ mod tests {
 
     #[test]
     fn instants_increase_at_any_jitter_and_are_even_without() {
-        let mut sensors = Sensors::<1>::default();
+        let mut sensors = PlantSensors::<1>::default();
         let even: Vec<f64> = sensors.instants(500.0, 1).take(1001).collect();
         let mut steps = even.iter().enumerate();
         assert!(steps.all(|(k, t)| (t - 0.002 * k as f64).abs() < 1e-12));
@@ -230,8 +234,8 @@ mod tests {
 
     #[test]
     fn dropouts_lose_the_share_that_was_asked_for() {
-        let mut sensors = Sensors::<1>::default();
-        let mut chance = stream(2, Purpose::Dropout);
+        let mut sensors = PlantSensors::<1>::default();
+        let mut chance = stream(2, ChancePurpose::Dropout);
         assert!(sensors.kept(1000, &mut chance).iter().all(|kept| *kept));
         sensors.dropouts = 0.1;
         let kept = sensors.kept(20_000, &mut chance);
@@ -241,12 +245,12 @@ mod tests {
 
     #[test]
     fn impossible_sensors_are_refused() {
-        let refuse = |change: fn(&mut Sensors<1>)| {
-            let mut sensors = Sensors::default();
+        let refuse = |change: fn(&mut PlantSensors<1>)| {
+            let mut sensors = PlantSensors::default();
             change(&mut sensors);
             sensors.check().is_err()
         };
-        assert!(Sensors::<1>::default().check().is_ok());
+        assert!(PlantSensors::<1>::default().check().is_ok());
         assert!(refuse(|s| s.jitter = -0.1));
         assert!(refuse(|s| s.dropouts = 1.0));
         assert!(refuse(|s| s.torque_noise = Noise::Relative(f64::NAN)));

@@ -1,8 +1,8 @@
 //! How an experiment is run: duration, rate, saturation, limits, sensors, seed.
 
 use super::SimulateError;
-use super::integrate::Tolerance;
-use super::sensors::Sensors;
+use super::integrate::StepTolerance;
+use super::sensors::PlantSensors;
 
 /// How the experiment is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,8 +13,8 @@ pub struct Settings<const J: usize> {
     pub rate_hz: f64,
     /// Largest voltage of the amplifiers, in both directions \[V\].
     pub saturation: f64,
-    pub tolerance: Tolerance,
-    pub sensors: Sensors<J>,
+    pub tolerance: StepTolerance,
+    pub sensors: PlantSensors<J>,
     pub seed: u64,
 }
 
@@ -50,8 +50,8 @@ impl<const J: usize> Settings<J> {
             seconds,
             rate_hz: 1000.0,
             saturation: 10.0,
-            tolerance: Tolerance::default(),
-            sensors: Sensors::default(),
+            tolerance: StepTolerance::default(),
+            sensors: PlantSensors::default(),
             seed: 0,
         }
     }
@@ -65,7 +65,7 @@ impl<const J: usize> Settings<J> {
         SimulateError::require(finite(self.seconds), "duration", self.seconds, rule)?;
         let rule = "must be above 0 Hz and finite";
         SimulateError::require(finite(self.rate_hz), "rate", self.rate_hz, rule)?;
-        let (Tolerance { absolute, relative }, rule) = (self.tolerance, "must be above 0");
+        let (StepTolerance { absolute, relative }, rule) = (self.tolerance, "must be above 0");
         SimulateError::require(finite(absolute), "absolute tolerance", absolute, rule)?;
         SimulateError::require(finite(relative), "relative tolerance", relative, rule)?;
         let (most, rule) = (self.saturation, "must be above 0 V");

@@ -5,7 +5,7 @@ use super::controller::ControllerSettings;
 use super::experiment::SECONDS;
 use super::mechanism::Mechanism;
 use super::plant::Plant;
-use super::sensors::{Noise, Sensors};
+use super::sensors::{Noise, PlantSensors};
 use super::settings::Settings;
 use cft_ident_files::config::robot_file::{self, RobotFile};
 
@@ -75,7 +75,7 @@ pub(super) fn settings<const J: usize>(
             });
         }
     };
-    settings.sensors = Sensors {
+    settings.sensors = PlantSensors {
         quantisation: quantisation.unwrap_or(true),
         jitter: jitter.unwrap_or(0.0),
         dropouts: dropouts.unwrap_or(0.0),

@@ -55,7 +55,7 @@ pub enum RunEnding {
 
 /// What was true at each row, and what the controller wanted.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Actual<const J: usize> {
+pub struct GroundTruth<const J: usize> {
     /// Joint positions, m or rad; those of the links where a joint is elastic.
     pub q: Vec<[f64; J]>,
     /// Joint speeds, m/s or rad/s.
@@ -84,7 +84,7 @@ pub struct SimulatedRun<const J: usize> {
     /// Joint torques of the logged volts at the logged pose, eq. (66), with their own noise, N or N m.
     pub torque: Vec<[f64; J]>,
     pub status: Vec<[MotorStatus; J]>,
-    pub actual: Actual<J>,
+    pub actual: GroundTruth<J>,
     /// The limits at which it ended.
     pub limits: Vec<LimitEvent>,
     pub ending: RunEnding,
@@ -105,7 +105,7 @@ impl<const J: usize> SimulatedRun<J> {
             q: Vec::new(),
             torque: Vec::new(),
             status: Vec::with_capacity(rows),
-            actual: Actual::default(),
+            actual: GroundTruth::default(),
             limits: Vec::new(),
             ending: RunEnding::Completed,
             volt_noise: [0.0; J],

@@ -1,7 +1,7 @@
 //! One joint with a constant inertia: tau = inertia a + F(v) + offset.
 
 use super::SimulateError;
-use super::effects::{EffectSpec, EffectValue, Effects, Sites};
+use super::effects::{EffectSpec, EffectValue, PlantEffects, RobotSites};
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
 use super::plant::Plant;
@@ -29,8 +29,8 @@ pub struct SingleJointTruth {
 pub fn effects(
     truth: &SingleJointTruth,
     specs: &[EffectSpec],
-) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
-    Effects::build(specs, &Sites::of(&truth.plant()?)?)
+) -> Result<(PlantEffects, Vec<EffectValue>), SimulateError> {
+    PlantEffects::build(specs, &RobotSites::of(&truth.plant()?)?)
 }
 
 impl SingleJointTruth {

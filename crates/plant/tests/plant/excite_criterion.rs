@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use cft_ident_files::config::{RobotFile, Trajectory};
-use cft_ident_plant::excite::information::Information;
+use cft_ident_plant::excite::information::InformationFactors;
 use cft_ident_plant::excite::machine::ForeseenRobot;
-use cft_ident_plant::excite::search::{FoundMotion, Task, design};
+use cft_ident_plant::excite::search::{DesignTask, FoundMotion, design};
 use cft_ident_plant::excite::series::Series;
 use cft_ident_plant::excite::usage::{along_period, worst};
 use cft_ident_plant::excite::{
@@ -26,8 +26,8 @@ fn table_3(machine: &ForeseenRobot) -> Series {
     series_of(machine, &file).expect("fits the machine")
 }
 
-fn task(criterion: Criterion) -> Task {
-    Task {
+fn task(criterion: Criterion) -> DesignTask {
+    DesignTask {
         criterion,
         fundamental_hz: 0.4,
         harmonics: 4,
@@ -40,12 +40,12 @@ fn task(criterion: Criterion) -> Task {
     }
 }
 
-fn found(machine: &ForeseenRobot, task: &Task) -> FoundMotion {
+fn found(machine: &ForeseenRobot, task: &DesignTask) -> FoundMotion {
     design(machine, task, &|_| {}, &AtomicBool::new(false)).expect("a design")
 }
 
 fn condition(machine: &ForeseenRobot, series: &Series) -> [f64; 2] {
-    let information = Information::of_period(machine, series, 250).expect("reachable");
+    let information = InformationFactors::of_period(machine, series, 250).expect("reachable");
     [Criterion::Condition, Criterion::ConditionNormalised]
         .map(|c| information.value(machine, &c, None).expect("finite"))
 }
@@ -59,7 +59,8 @@ fn table_3_has_condition_159_07_raw_and_91_73_normalised() {
     let machine = built("configs/cft.toml");
     let series = table_3(&machine);
     for samples in [25, 48, 250] {
-        let information = Information::of_period(&machine, &series, samples).expect("reachable");
+        let information =
+            InformationFactors::of_period(&machine, &series, samples).expect("reachable");
         let value = |c| information.value(&machine, &c, None).expect("finite");
         assert!((value(Criterion::Condition) - 159.07).abs() < 0.005);
         assert!((value(Criterion::ConditionNormalised) - 91.73).abs() < 0.005);
@@ -82,7 +83,7 @@ fn designs_reach_15_raw_and_9_normalised_within_every_limit() {
 fn given_offsets_are_kept_and_dspace_volts_bind() {
     let machine = built("configs/cft-dspace.toml");
     let offsets = [None, Some(0.2766), Some(2.4), Some(-0.2)];
-    let task = Task {
+    let task = DesignTask {
         offsets: offsets.to_vec(),
         starts: 3,
         ..task(Criterion::ConditionNormalised)
@@ -106,7 +107,7 @@ fn a_design_after_another_tells_what_the_first_leaves_open() {
     let mut machine = built("configs/cft.toml");
     machine.noise = vec![2.0, 0.3, 0.2, 0.3];
     let first = table_3(&machine);
-    let information = Information::of_period(&machine, &first, 250).expect("reachable");
+    let information = InformationFactors::of_period(&machine, &first, 250).expect("reachable");
     let mut given = GivenInformation::nothing(&machine);
     given.add_motion(&information, 2500.0);
     let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
@@ -115,19 +116,19 @@ fn a_design_after_another_tells_what_the_first_leaves_open() {
         information: given.weighted(&weights),
         rows: 2500.0,
     };
-    let task = Task {
+    let task = DesignTask {
         starts: 3,
         evaluations: Some(400),
         ..task(criterion.clone())
     };
     let alone = found(&machine, &task).series;
-    let together = Task {
+    let together = DesignTask {
         prior: Some(prior.clone()),
         ..task
     };
     let complement = found(&machine, &together).series;
     let value = |series: &Series| {
-        let information = Information::of_period(&machine, series, 250).expect("reachable");
+        let information = InformationFactors::of_period(&machine, series, 250).expect("reachable");
         let value = information.value(&machine, &criterion, Some(&prior));
         value.expect("finite")
     };
@@ -142,13 +143,13 @@ fn chosen_parameters_become_surer_than_by_any_other_criterion() {
     let mut factors = vec![0.0; 12];
     factors[5] = 1.0;
     let chosen = Criterion::AOptimal(factors);
-    let quick = |criterion| Task {
+    let quick = |criterion| DesignTask {
         starts: 3,
         evaluations: Some(500),
         ..task(criterion)
     };
     let value = |series: &Series| {
-        let information = Information::of_period(&machine, series, 250).expect("reachable");
+        let information = InformationFactors::of_period(&machine, series, 250).expect("reachable");
         information.value(&machine, &chosen, None).expect("finite")
     };
     let own = value(&found(&machine, &quick(chosen.clone())).series);
@@ -166,7 +167,7 @@ fn single_joints_are_designed_with_their_linear_friction() {
     );
     let bounded = RobotFile::parse("one.toml", &whole).expect("a robot file");
     let machine = machine(&bounded, None).expect("a machine");
-    let task = Task {
+    let task = DesignTask {
         offsets: vec![None],
         starts: 4,
         ..task(Criterion::ConditionNormalised)
@@ -184,7 +185,7 @@ fn single_joints_are_designed_with_their_linear_friction() {
 #[test]
 fn a_design_reads_back_from_its_file_to_the_same_series() {
     let machine = built("configs/cft.toml");
-    let task = Task {
+    let task = DesignTask {
         starts: 2,
         evaluations: Some(60),
         ..task(Criterion::DOptimal)
@@ -221,7 +222,7 @@ fn a_stopped_search_gives_what_it_has() {
 #[test]
 fn designs_do_not_depend_on_the_number_of_threads() {
     let machine = built("configs/cft.toml");
-    let task = Task {
+    let task = DesignTask {
         starts: 5,
         evaluations: Some(120),
         ..task(Criterion::Condition)

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use cft_ident_files::config::{RobotFile, Trajectory};
-use cft_ident_plant::excite::blend::Blend;
+use cft_ident_plant::excite::blend::TimeScaling;
 use cft_ident_plant::excite::limits::BoundedQuantity;
 use cft_ident_plant::excite::machine::ForeseenRobot;
-use cft_ident_plant::excite::search::{Task, design};
+use cft_ident_plant::excite::search::{DesignTask, design};
 use cft_ident_plant::excite::series::{Kinematics, Series};
 use cft_ident_plant::excite::usage::{along_blend, along_period, worst};
 use cft_ident_plant::excite::{Criterion, Motion, machine, trajectory};
@@ -31,7 +31,7 @@ fn quick(machine: &ForeseenRobot, seed: u64, evaluations: u64) -> Series {
         Criterion::DOptimal,
         Criterion::AOptimal(vec![1.0; 12]),
     ];
-    let task = Task {
+    let task = DesignTask {
         criterion: criteria[seed as usize % 4].clone(),
         fundamental_hz: [0.4, 0.25, 0.8][seed as usize % 3],
         harmonics: 1 + seed as usize % 6,
@@ -94,7 +94,7 @@ fn blends_keep_every_limit_and_begin_and_end_at_rest() {
         let series = quick(&machine, seed, 60);
         let reserved: Vec<BoundedQuantity> =
             machine.channels.iter().map(|c| c.reserved(-0.02)).collect();
-        let blend = Blend::within(&machine, &reserved, &series, 2, None).expect("a blend");
+        let blend = TimeScaling::within(&machine, &reserved, &series, 2, None).expect("a blend");
         let end = blend.duration(series.period());
         let step = end / 40_000.0;
         let at = |m: usize| blend.at(&series, step * m as f64);
@@ -113,7 +113,7 @@ fn blends_keep_every_limit_and_begin_and_end_at_rest() {
 fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
     let file = robot("configs/cft.toml");
     let machine = built("configs/cft.toml");
-    let task = Task {
+    let task = DesignTask {
         criterion: Criterion::ConditionNormalised,
         fundamental_hz: 0.4,
         harmonics: 4,
@@ -127,7 +127,7 @@ fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
     let found = design(&machine, &task, &|_| {}, &AtomicBool::new(false)).expect("a design");
     let reserved: Vec<BoundedQuantity> =
         machine.channels.iter().map(|c| c.reserved(0.05)).collect();
-    let blend = Blend::within(&machine, &reserved, &found.series, 2, None).expect("a blend");
+    let blend = TimeScaling::within(&machine, &reserved, &found.series, 2, None).expect("a blend");
     let mut fourier = trajectory(&machine, &found.series);
     fourier.start_s = Some(blend.start);
     fourier.blend_s = Some(blend.seconds);

@@ -1,12 +1,16 @@
 //! The CFT robot as the simulator runs it: equations, limits, saturation, start and rest.
 
-use cft_ident_core::robot::cft::Setup;
+use cft_ident_core::robot::cft::LaboratorySetup;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::reference::travel;
 use cft_ident_plant::simulate::{CftTruth, MotorStatus, OneJointMove, RunEnding, Settings};
 
 /// Runs one of the five standard experiments: ladders of q1, q2, q4, q5, then Table 3.
-fn standard(setup: Setup, number: usize, seed: u64) -> cft_ident_plant::simulate::SimulatedRun<4> {
+fn standard(
+    setup: LaboratorySetup,
+    number: usize,
+    seed: u64,
+) -> cft_ident_plant::simulate::SimulatedRun<4> {
     let truth = CftTruth::synthetic(setup);
     let reference = if number < 4 {
         OneJointMove::new(number, 20.0, Some(seed))
@@ -20,7 +24,7 @@ fn standard(setup: Setup, number: usize, seed: u64) -> cft_ident_plant::simulate
 
 #[test]
 fn standard_experiments_stay_inside_every_limit_and_below_saturation() {
-    for setup in [Setup::Tuedacs, Setup::Dspace] {
+    for setup in [LaboratorySetup::Tuedacs, LaboratorySetup::Dspace] {
         for number in 0..5 {
             let recording = standard(setup, number, 3);
             assert_eq!(recording.ending, RunEnding::Completed, "{setup:?} {number}");
@@ -38,7 +42,7 @@ fn standard_experiments_stay_inside_every_limit_and_below_saturation() {
 
 #[test]
 fn controller_tracks_within_millimetres_and_hundredths_of_a_radian() {
-    for setup in [Setup::Tuedacs, Setup::Dspace] {
+    for setup in [LaboratorySetup::Tuedacs, LaboratorySetup::Dspace] {
         let plant = CftTruth::synthetic(setup).plant().expect("a pose");
         for number in 0..5 {
             let actual = standard(setup, number, 1).actual;
@@ -61,7 +65,7 @@ fn ladders_hold_the_other_joints_and_cover_their_own_range() {
         .into_iter()
         .enumerate()
     {
-        let recording = standard(Setup::Tuedacs, number, 1);
+        let recording = standard(LaboratorySetup::Tuedacs, number, 1);
         for joint in 0..4 {
             let values = recording.actual.q.iter().map(|q| q[joint]);
             let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
@@ -80,7 +84,7 @@ fn ladders_hold_the_other_joints_and_cover_their_own_range() {
 
 #[test]
 fn travel_of_a_joint_ends_at_the_margin_of_a_limit() {
-    let setup = Setup::Tuedacs;
+    let setup = LaboratorySetup::Tuedacs;
     let plant = CftTruth::synthetic(setup).plant().expect("a pose");
     let limits = setup.limits();
     let pose =

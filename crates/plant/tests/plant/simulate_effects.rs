@@ -9,29 +9,29 @@ mod serial;
 mod static_torques;
 
 use cft_ident_core::robot::cft::pantograph::reference_jacobian;
-use cft_ident_core::robot::cft::{Coefficients, Setup, dynamics};
+use cft_ident_core::robot::cft::{LaboratorySetup, ReportCoefficients, dynamics};
 use cft_ident_plant::simulate::cft::{effects, excitation, follow};
 use cft_ident_plant::simulate::effects::{Effect, LAWS, PlantState};
-use cft_ident_plant::simulate::moving::Moving;
+use cft_ident_plant::simulate::moving::MovingPlant;
 use cft_ident_plant::simulate::{
-    CftTruth, EffectSpec, Effects, MotorInput, Sensors, Settings, SimulateError, Start, VoltSeries,
-    run,
+    CftTruth, EffectSpec, MotionStart, MotorInput, PlantEffects, PlantSensors, Settings,
+    SimulateError, VoltSeries, run,
 };
 use cft_ident_plant::simulate::{SingleJointTruth, SmoothFriction};
 
 fn truth() -> CftTruth {
-    CftTruth::synthetic(Setup::Tuedacs)
+    CftTruth::synthetic(LaboratorySetup::Tuedacs)
 }
 
-fn build(texts: &[&str]) -> Result<Effects, SimulateError> {
+fn build(texts: &[&str]) -> Result<PlantEffects, SimulateError> {
     let specs: Result<Vec<EffectSpec>, _> = texts.iter().map(|text| text.parse()).collect();
     Ok(effects(&truth(), &specs?)?.0)
 }
 
 /// Torque that the effects take from the motors at a state.
-fn added(effects: Effects, q: [f64; 4], v: [f64; 4]) -> [f64; 4] {
+fn added(effects: PlantEffects, q: [f64; 4], v: [f64; 4]) -> [f64; 4] {
     let plant = truth().plant().expect("a pose");
-    let with = Moving {
+    let with = MovingPlant {
         plant: &plant,
         effects,
         volts: [0.0; 4],
@@ -117,16 +117,22 @@ fn names_of_effects_are_unique_and_their_keys_too() {
 #[test]
 fn logged_torque_of_a_robot_with_an_offset_is_that_much_larger() {
     let settings = Settings {
-        sensors: Sensors::perfect(),
+        sensors: PlantSensors::perfect(),
         ..Settings::new(6.0)
     };
     let run = |texts: &[&str]| {
         let specs: Vec<EffectSpec> = texts.iter().map(|t| t.parse().expect("read")).collect();
-        follow(&truth(), &specs, excitation(Setup::Tuedacs), &settings).expect("runs")
+        follow(
+            &truth(),
+            &specs,
+            excitation(LaboratorySetup::Tuedacs),
+            &settings,
+        )
+        .expect("runs")
     };
     let offset = 2.0;
     let recording = run(&["torque-offset:q4:c=2"]);
-    let coefficients = Coefficients::from_theta12(&truth().printed());
+    let coefficients = ReportCoefficients::from_theta12(&truth().printed());
     // Over whole periods the declared model's torque, by the true motion, misses the offset.
     let period = 2500;
     let (first, last) = (3000, 3000 + period);
@@ -234,13 +240,13 @@ fn joint() -> SingleJointTruth {
 }
 
 fn pushed(effect: Box<dyn Effect>, volts: Vec<f64>) -> cft_ident_plant::simulate::SimulatedRun<1> {
-    let mut effects = Effects::default();
+    let mut effects = PlantEffects::default();
     effects.push(effect);
     let times = (0..volts.len()).map(|k| k as f64).collect();
     let seconds = volts.len() as f64;
     let series =
         VoltSeries::new(times, volts.into_iter().map(|u| [u]).collect()).expect("a series");
-    let start = Start::State {
+    let start = MotionStart::State {
         position: [0.0],
         speed: [0.0],
     };
@@ -327,15 +333,15 @@ fn effect_with_inertia_in_actuator_coordinates_adds_the_rotor_energy() {
     }; 4];
     let plant = truth.plant().expect("a pose");
     let mass = 63.2;
-    let mut effects = Effects::default();
+    let mut effects = PlantEffects::default();
     effects.push(Box::new(Rotor { mass }));
-    let start = Start::State {
+    let start = MotionStart::State {
         position: [-0.1343, 0.2766, 2.8, 0.2],
         speed: [0.05, 0.1, 0.0, 0.0],
     };
     let drive = MotorInput::Volts(VoltSeries::new(vec![0.0], vec![[0.0; 4]]).expect("a series"));
     let settings = Settings {
-        sensors: Sensors::perfect(),
+        sensors: PlantSensors::perfect(),
         ..Settings::new(0.1)
     };
     let recording = run(&plant, effects, &start, &drive, &settings).expect("runs");
@@ -352,7 +358,8 @@ fn effect_with_inertia_in_actuator_coordinates_adds_the_rotor_energy() {
     };
     let power = |k: usize| {
         let (q, v) = (recording.actual.q[k], recording.actual.v[k]);
-        let gravity = dynamics::gravity_torque(&q, &Coefficients::from_theta12(&truth.printed()));
+        let gravity =
+            dynamics::gravity_torque(&q, &ReportCoefficients::from_theta12(&truth.printed()));
         -(0..4).map(|i| gravity[i] * v[i]).sum::<f64>()
     };
     let last = recording.rows() - 1;

@@ -1,13 +1,13 @@
 //! The integration against the equations: reference states, energy, tolerance, a second integrator.
 
 use cft_ident_core::robot::cft::geometry::{GRAVITY, L4, L6, U};
-use cft_ident_core::robot::cft::{Coefficients, Setup, dynamics};
+use cft_ident_core::robot::cft::{LaboratorySetup, ReportCoefficients, dynamics};
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
-use cft_ident_plant::simulate::integrate::{DormandPrince, System, Tolerance};
-use cft_ident_plant::simulate::moving::Moving;
+use cft_ident_plant::simulate::integrate::{DormandPrince, OdeSystem, StepTolerance};
+use cft_ident_plant::simulate::moving::MovingPlant;
 use cft_ident_plant::simulate::{
-    CftTruth, Effects, OneJointMove, Plant, Sensors, Settings, SimulatedRun,
+    CftTruth, OneJointMove, Plant, PlantEffects, PlantSensors, Settings, SimulatedRun,
 };
 use serde_json::Value;
 
@@ -19,10 +19,10 @@ const FREE: DoubleTanh = DoubleTanh {
     slope_2: 1.0,
 };
 
-fn moving(plant: &Plant<4>, volts: [f64; 4]) -> Moving<'_, 4> {
-    Moving {
+fn moving(plant: &Plant<4>, volts: [f64; 4]) -> MovingPlant<'_, 4> {
+    MovingPlant {
         plant,
-        effects: Effects::default(),
+        effects: PlantEffects::default(),
         volts,
     }
 }
@@ -36,7 +36,7 @@ fn plant_accelerates_as_the_reference_states_say() {
     let file = std::path::Path::new(cft_ident_support::ROOT).join("fixtures/oracle/reference.json");
     let text = std::fs::read_to_string(file).expect("fixture");
     let oracle: Value = serde_json::from_str(&text).expect("JSON");
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     for (k, number) in truth
         .printed()
         .iter()
@@ -74,7 +74,7 @@ fn plant_accelerates_as_the_reference_states_say() {
 
 /// Kinetic plus potential energy of the frictionless robot; the potential's gradient is G of eq. (17).
 fn energy(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> f64 {
-    let mass = dynamics::inertia(q, &Coefficients::from_theta12(theta));
+    let mass = dynamics::inertia(q, &ReportCoefficients::from_theta12(theta));
     let kinetic: f64 = (0..4)
         .flat_map(|i| (0..4).map(move |j| (i, j)))
         .map(|(i, j)| 0.5 * v[i] * mass[i][j] * v[j])
@@ -90,7 +90,7 @@ fn energy(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> f64 {
 
 #[test]
 fn energy_is_conserved_without_friction_and_volts() {
-    let mut truth = CftTruth::synthetic(Setup::Tuedacs);
+    let mut truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     truth.friction = [FREE; 4];
     let plant = truth.plant().expect("a pose");
     let mut system = moving(&plant, [0.0; 4]);
@@ -104,7 +104,7 @@ fn energy_is_conserved_without_friction_and_volts() {
     };
     let (q, v) = split(&y);
     let start = energy(&q, &v, &theta);
-    let mut integrator = DormandPrince::new(Tolerance::default());
+    let mut integrator = DormandPrince::new(StepTolerance::default());
     let mut exchanged: f64 = 0.0;
     for k in 0..5000 {
         let t = 1e-3 * f64::from(k);
@@ -127,8 +127,8 @@ fn energy_is_conserved_without_friction_and_volts() {
 
 #[test]
 fn friction_and_volts_change_the_energy_by_their_work() {
-    struct Powered<'a>(Moving<'a, 4>, [DoubleTanh; 4]);
-    impl System<16> for Powered<'_> {
+    struct Powered<'a>(MovingPlant<'a, 4>, [DoubleTanh; 4]);
+    impl OdeSystem<16> for Powered<'_> {
         fn rates(&self, t: f64, y: &[f64; 16], dydt: &mut [f64; 16]) {
             self.0.rates(t, y, dydt);
             let q = std::array::from_fn(|i| y[i]);
@@ -137,7 +137,7 @@ fn friction_and_volts_change_the_energy_by_their_work() {
             dydt[8] = (0..4).map(power).sum();
         }
     }
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let plant = truth.plant().expect("a pose");
     let volts = [-0.9, 0.3, 0.5, 2.0];
     let mut system = Powered(moving(&plant, volts), truth.friction);
@@ -152,7 +152,7 @@ fn friction_and_volts_change_the_energy_by_their_work() {
         )
     };
     let start = at(&y);
-    let mut integrator = DormandPrince::new(Tolerance::default());
+    let mut integrator = DormandPrince::new(StepTolerance::default());
     integrator
         .advance(&mut system, 0.0, 0.5, &mut y)
         .expect("smooth");
@@ -180,9 +180,9 @@ fn difference(a: &SimulatedRun<4>, b: &SimulatedRun<4>) -> (f64, f64) {
 
 #[test]
 fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     for number in 0..5 {
-        let with = |tolerance: Tolerance| {
+        let with = |tolerance: StepTolerance| {
             let reference = if number < 4 {
                 OneJointMove::new(number, 20.0, None)
                     .reference(&mechanism(truth.setup).expect("four joints"))
@@ -193,19 +193,19 @@ fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
             // Without quantisation: a count that tips over elsewhere is no error of integration.
             let settings = Settings {
                 tolerance,
-                sensors: Sensors::perfect(),
+                sensors: PlantSensors::perfect(),
                 ..Settings::new(20.0)
             };
             follow(&truth, &[], reference, &settings).expect("runs")
         };
-        let normal = with(Tolerance::default());
-        let (q, v) = difference(&normal, &with(Tolerance::default().scaled(0.5)));
+        let normal = with(StepTolerance::default());
+        let (q, v) = difference(&normal, &with(StepTolerance::default().scaled(0.5)));
         println!("experiment {number}: q {q:.1e}, v {v:.1e}");
         assert!(
             q < 1e-9 && v < 1e-7,
             "halved tolerance, experiment {number}: q {q}, v {v}"
         );
-        let (q, v) = difference(&normal, &with(Tolerance::default().scaled(1e-3)));
+        let (q, v) = difference(&normal, &with(StepTolerance::default().scaled(1e-3)));
         println!("experiment {number}: q {q:.1e}, v {v:.1e} to the thousandth of it");
         assert!(
             q < 2e-9 && v < 2e-7,
@@ -216,13 +216,13 @@ fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
 
 #[test]
 fn runge_kutta_with_a_bounded_step_agrees_through_the_stiff_reversal() {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let plant = truth.plant().expect("a pose");
     // Every joint is braked through zero speed by friction and volts.
     let start = [0.2, 0.3, -0.9, 1.9, 0.02, 0.1, 0.1, -0.1];
     let mut system = moving(&plant, [-0.5, 0.0, -0.2, -0.9]);
     let mut adaptive = start;
-    let mut integrator = DormandPrince::new(Tolerance::default());
+    let mut integrator = DormandPrince::new(StepTolerance::default());
     for k in 0..300 {
         let t = 1e-3 * f64::from(k);
         integrator

@@ -1,19 +1,19 @@
 //! Starts, limits, saturation, rest, open loop: the behaviour of the report's simulation block.
 
 use cft_ident_core::robot::RobotError;
-use cft_ident_core::robot::cft::{Setup, pantograph};
+use cft_ident_core::robot::cft::{LaboratorySetup, pantograph};
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_plant::simulate::cft::{excitation, follow, mechanism};
 use cft_ident_plant::simulate::{
-    CftTruth, Effects, MotorInput, MotorStatus, Path, Reference, ReferenceFrame, RunEnding,
-    Sensors, Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
+    CftTruth, MotionStart, MotorInput, MotorStatus, Path, PlantEffects, PlantSensors, Reference,
+    ReferenceFrame, RunEnding, Settings, SimulateError, SimulatedRun, VoltSeries, run,
 };
 use cft_ident_plant::simulate::{OneJointMove, SingleJointTruth, SmoothFriction};
 
 use crate::simulate_effects::missing::axis;
 
 fn truth() -> CftTruth {
-    CftTruth::synthetic(Setup::Tuedacs)
+    CftTruth::synthetic(LaboratorySetup::Tuedacs)
 }
 
 fn constant(volts: [f64; 4]) -> MotorInput<4> {
@@ -22,26 +22,26 @@ fn constant(volts: [f64; 4]) -> MotorInput<4> {
 
 fn perfect(seconds: f64) -> Settings<4> {
     Settings {
-        sensors: Sensors::perfect(),
+        sensors: PlantSensors::perfect(),
         ..Settings::new(seconds)
     }
 }
 
-fn at_rest(position: [f64; 4]) -> Start<4> {
-    Start::State {
+fn at_rest(position: [f64; 4]) -> MotionStart<4> {
+    MotionStart::State {
         position,
         speed: [0.0; 4],
     }
 }
 
 fn play(
-    start: &Start<4>,
+    start: &MotionStart<4>,
     drive: &MotorInput<4>,
     settings: &Settings<4>,
 ) -> Result<SimulatedRun<4>, SimulateError> {
     run(
         &truth().plant().expect("a pose"),
-        Effects::default(),
+        PlantEffects::default(),
         start,
         drive,
         settings,
@@ -52,7 +52,7 @@ fn play(
 fn eight_initial_conditions_come_back_in_the_first_row() {
     let position = [-0.2, 0.15, 1.3, 0.4];
     let speed = [0.02, -0.03, 0.4, -0.1];
-    let start = Start::State { position, speed };
+    let start = MotionStart::State { position, speed };
     let recording = play(&start, &constant([0.0; 4]), &perfect(0.01)).expect("runs");
     let (q, v) = (recording.actual.q[0], recording.actual.v[0]);
     for i in 0..4 {
@@ -86,7 +86,7 @@ fn robot_at_rest_without_gravity_load_and_volts_stays_at_rest() {
     let start = at_rest([-0.13, 0.27, 2.8, 0.2]);
     let recording = run(
         &plant,
-        Effects::default(),
+        PlantEffects::default(),
         &start,
         &constant([0.0; 4]),
         &perfect(1.0),
@@ -153,7 +153,7 @@ fn limit_stops_the_run_and_says_which_coordinate_and_when() {
     let place = place.expect("a coordinate");
     assert_eq!(recording.status[last][place], MotorStatus::LimitReached);
     assert_eq!(event.t, recording.t[last]);
-    let upper = Setup::Tuedacs.limits().upper[place];
+    let upper = LaboratorySetup::Tuedacs.limits().upper[place];
     assert!(
         event.value > upper && event.value < upper + 1e-2,
         "{event:?}"
@@ -191,9 +191,15 @@ fn saturation_cuts_the_volts_and_marks_the_channel() {
 #[test]
 fn logged_volts_played_back_repeat_the_motion() {
     let settings = perfect(3.0);
-    let first = follow(&truth(), &[], excitation(Setup::Tuedacs), &settings).expect("runs");
+    let first = follow(
+        &truth(),
+        &[],
+        excitation(LaboratorySetup::Tuedacs),
+        &settings,
+    )
+    .expect("runs");
     let series = VoltSeries::new(first.t.clone(), first.volts.clone()).expect("a series");
-    let start = Start::State {
+    let start = MotionStart::State {
         position: first.x[0],
         speed: [0.0; 4],
     };
@@ -251,7 +257,7 @@ fn unusable_starts_settings_and_volts_are_errors_with_the_way_out() {
             Err(SimulateError::Volts { .. })
         ));
     }
-    let wild = Start::State {
+    let wild = MotionStart::State {
         position: [-0.1, 0.2, 2.0, 0.1],
         speed: [1e9, 0.0, 0.0, 0.0],
     };
@@ -270,8 +276,13 @@ fn unusable_starts_settings_and_volts_are_errors_with_the_way_out() {
 
 #[test]
 fn table_3_with_the_printed_offsets_is_refused_on_dspace() {
-    let truth = CftTruth::synthetic(Setup::Dspace);
-    let outcome = follow(&truth, &[], excitation(Setup::Tuedacs), &perfect(1.0));
+    let truth = CftTruth::synthetic(LaboratorySetup::Dspace);
+    let outcome = follow(
+        &truth,
+        &[],
+        excitation(LaboratorySetup::Tuedacs),
+        &perfect(1.0),
+    );
     match outcome {
         Err(SimulateError::LimitAtStart { coordinate, .. }) => assert_eq!(coordinate, "x_c4"),
         other => panic!("{other:?}"),
@@ -294,12 +305,12 @@ fn single_joint_follows_its_equation_exactly() {
     joint.check().expect("physical");
     let drive =
         MotorInput::Volts(VoltSeries::new(vec![0.0, 10.0], vec![[1.0]; 2]).expect("a series"));
-    let start = Start::State {
+    let start = MotionStart::State {
         position: [0.0],
         speed: [0.0],
     };
     let settings = Settings::new(2.0);
-    let recording = run(&joint, Effects::default(), &start, &drive, &settings).expect("runs");
+    let recording = run(&joint, PlantEffects::default(), &start, &drive, &settings).expect("runs");
     for (t, v) in recording.t.iter().zip(&recording.actual.v) {
         let exact = 38.0 / 200.0 * (1.0 - (-200.0 * t / 95.0).exp());
         assert!((v[0] - exact).abs() < 1e-9, "{} for {exact}", v[0]);
@@ -322,7 +333,7 @@ fn dry_friction_holds_a_single_joint_below_its_breakaway() {
         let drive = MotorInput::Volts(
             VoltSeries::new(vec![0.0, 10.0], vec![[force]; 2]).expect("a series"),
         );
-        let start = Start::State {
+        let start = MotionStart::State {
             position: [0.0],
             speed: [0.0],
         };
@@ -330,7 +341,8 @@ fn dry_friction_holds_a_single_joint_below_its_breakaway() {
             saturation: f64::INFINITY,
             ..Settings::new(1.0)
         };
-        let recording = run(&joint, Effects::default(), &start, &drive, &settings).expect("runs");
+        let recording =
+            run(&joint, PlantEffects::default(), &start, &drive, &settings).expect("runs");
         recording.actual.q.last().expect("rows")[0]
     };
     assert!(travelled(15.0) < 2e-4, "{}", travelled(15.0));
@@ -347,7 +359,7 @@ fn one_joint_moves_stay_inside_given_ranges_or_are_refused() {
     let recording = follow(
         &truth(),
         &[],
-        plan.reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+        plan.reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
             .expect("fits"),
         &perfect(20.0),
     )
@@ -364,13 +376,13 @@ fn one_joint_moves_stay_inside_given_ranges_or_are_refused() {
         ..plan
     };
     let text = wide
-        .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+        .reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
         .expect_err("too wide")
         .to_string();
     assert!(text.contains("q1 cannot move over [0, 2]"), "{text}");
     assert!(
         OneJointMove::new(9, 20.0, None)
-            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+            .reference(&mechanism(LaboratorySetup::Tuedacs).expect("four joints"))
             .is_err()
     );
 }

@@ -349,7 +349,7 @@ fn orders_that_name_what_is_not_there_are_refused() {
     );
     assert!(text(Experiment::Trajectory(&other)).contains("has 1 coordinates and the robot has 4"));
     let mut dspace = robot.clone();
-    dspace.robot.setup = Some(cft_ident_core::robot::cft::Setup::Dspace);
+    dspace.robot.setup = Some(cft_ident_core::robot::cft::LaboratorySetup::Dspace);
     let table = Trajectory::load(Path::new("configs/table3.toml")).expect("embedded");
     let refused = simulate(&order(&dspace, Experiment::Trajectory(&table))).expect_err("outside");
     assert!(refused.to_string().contains("x_c4"), "{refused}");

@@ -1,12 +1,12 @@
 //! What is logged: counts, seeds, noise, torques by (66), lost and uneven samples.
 
 use cft_ident_core::robot::cft::actuation::ENCODER_SCALE;
-use cft_ident_core::robot::cft::{Setup, pantograph};
+use cft_ident_core::robot::cft::{LaboratorySetup, pantograph};
 use cft_ident_plant::simulate::cft::{excitation, follow};
-use cft_ident_plant::simulate::{CftTruth, Noise, Sensors, Settings, SimulatedRun};
+use cft_ident_plant::simulate::{CftTruth, Noise, PlantSensors, Settings, SimulatedRun};
 
-fn run(sensors: Sensors<4>, seed: u64, effects: &[&str]) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+fn run(sensors: PlantSensors<4>, seed: u64, effects: &[&str]) -> SimulatedRun<4> {
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let effects: Vec<_> = effects
         .iter()
         .map(|text| text.parse().expect("effect"))
@@ -19,17 +19,17 @@ fn run(sensors: Sensors<4>, seed: u64, effects: &[&str]) -> SimulatedRun<4> {
     follow(&truth, &effects, excitation(truth.setup), &settings).expect("runs")
 }
 
-fn noisy() -> Sensors<4> {
-    Sensors {
+fn noisy() -> PlantSensors<4> {
+    PlantSensors {
         volt_noise: Noise::Absolute([1e-3, 2e-3, 3e-3, 4e-3]),
         torque_noise: Noise::Relative(0.01),
-        ..Sensors::default()
+        ..PlantSensors::default()
     }
 }
 
 #[test]
 fn logged_coordinates_are_whole_counts_and_joints_are_their_image() {
-    let recording = run(Sensors::default(), 0, &[]);
+    let recording = run(PlantSensors::default(), 0, &[]);
     for (x, q) in recording.x.iter().zip(&recording.q) {
         for (x, scale) in x.iter().zip(ENCODER_SCALE) {
             let counts = x / scale;
@@ -48,7 +48,7 @@ fn logged_coordinates_are_whole_counts_and_joints_are_their_image() {
 #[test]
 fn logged_torques_are_the_logged_volts_by_equation_66() {
     let recording = run(
-        Sensors {
+        PlantSensors {
             torque_noise: Noise::None,
             ..noisy()
         },
@@ -56,14 +56,15 @@ fn logged_torques_are_the_logged_volts_by_equation_66() {
         &[],
     );
     for k in 0..recording.rows() {
-        let torque = Setup::Tuedacs.volts_to_torques(&recording.q[k], &recording.volts[k]);
+        let torque =
+            LaboratorySetup::Tuedacs.volts_to_torques(&recording.q[k], &recording.volts[k]);
         assert_eq!(recording.torque[k], torque);
     }
 }
 
 #[test]
 fn one_seed_repeats_the_log_bit_for_bit_and_another_does_not() {
-    let sensors = Sensors {
+    let sensors = PlantSensors {
         jitter: 0.1,
         dropouts: 0.05,
         ..noisy()
@@ -77,7 +78,7 @@ fn one_seed_repeats_the_log_bit_for_bit_and_another_does_not() {
 
 #[test]
 fn noise_changes_the_log_and_not_the_motion() {
-    let (clean, noisy) = (run(Sensors::default(), 7, &[]), run(noisy(), 7, &[]));
+    let (clean, noisy) = (run(PlantSensors::default(), 7, &[]), run(noisy(), 7, &[]));
     assert_eq!(clean.actual, noisy.actual);
     assert_eq!(clean.q, noisy.q);
     assert_ne!(clean.torque, noisy.torque);
@@ -85,14 +86,14 @@ fn noise_changes_the_log_and_not_the_motion() {
 
 #[test]
 fn noise_is_the_same_with_effects_on_and_off() {
-    let sensors = Sensors {
+    let sensors = PlantSensors {
         volt_noise: Noise::Absolute([1e-3; 4]),
         torque_noise: Noise::Absolute([0.5, 0.1, 0.1, 0.1]),
         dropouts: 0.02,
         jitter: 0.05,
-        ..Sensors::default()
+        ..PlantSensors::default()
     };
-    let quiet = Sensors {
+    let quiet = PlantSensors {
         volt_noise: Noise::None,
         torque_noise: Noise::None,
         ..sensors
@@ -103,7 +104,8 @@ fn noise_is_the_same_with_effects_on_and_off() {
         // The torque's own noise: what is left over (66) of the logged volts.
         let own: Vec<f64> = (0..with.rows())
             .flat_map(|k| {
-                let by_volts = Setup::Tuedacs.volts_to_torques(&with.q[k], &with.volts[k]);
+                let by_volts =
+                    LaboratorySetup::Tuedacs.volts_to_torques(&with.q[k], &with.volts[k]);
                 std::array::from_fn::<f64, 4, _>(|i| with.torque[k][i] - by_volts[i])
             })
             .collect();
@@ -132,7 +134,7 @@ fn noise_is_the_same_with_effects_on_and_off() {
 #[test]
 fn relative_torque_noise_is_sized_by_each_joint() {
     let recording = run(noisy(), 2, &[]);
-    let clean = run(Sensors::default(), 2, &[]);
+    let clean = run(PlantSensors::default(), 2, &[]);
     for i in 0..4 {
         let mean: f64 = clean.torque.iter().map(|tau| tau[i] * tau[i]).sum();
         let rms = (mean / clean.rows() as f64).sqrt();
@@ -142,11 +144,11 @@ fn relative_torque_noise_is_sized_by_each_joint() {
 
 #[test]
 fn lost_rows_and_uneven_instants_leave_times_that_are_true() {
-    let sensors = Sensors {
+    let sensors = PlantSensors {
         quantisation: false,
         jitter: 0.2,
         dropouts: 0.1,
-        ..Sensors::default()
+        ..PlantSensors::default()
     };
     let recording = run(sensors, 5, &[]);
     assert!(

@@ -35,11 +35,11 @@ pub enum JsonError {
 
 /// A complete document, ready to be printed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Document {
+pub struct JsonDocument {
     fields: Map<String, Value>,
 }
 
-impl Document {
+impl JsonDocument {
     /// The document of `command` (`"friction"`, ...) around the fields of `result`.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl Document {
                     }
                     fields.insert(field, value);
                 }
-                return Ok(Document { fields });
+                return Ok(JsonDocument { fields });
             }
             Value::Null => "null",
             Value::Bool(_) => "a truth value",
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn the_envelope_comes_first_and_the_result_follows_in_its_order() {
         let result = json!({"joints": [], "condition": {"raw": 2.5}});
-        let document = Document::new("lsq", &[input()], &["a gap".into()], &result).unwrap();
+        let document = JsonDocument::new("lsq", &[input()], &["a gap".into()], &result).unwrap();
         let keys: Vec<_> = document.fields().keys().map(String::as_str).collect();
         assert_eq!(
             keys.join(" "),
@@ -193,7 +193,7 @@ mod tests {
     fn numbers_that_are_not_finite_become_null() {
         let list = [f64::INFINITY, 0.1 + 0.2, f64::NEG_INFINITY, f64::NAN];
         let odd = std::collections::BTreeMap::from([("list", list)]);
-        let document = Document::new("friction", &[], &[], &odd).unwrap();
+        let document = JsonDocument::new("friction", &[], &[], &odd).unwrap();
         let back: Value = serde_json::from_str(&document.text()).unwrap();
         assert_eq!(back["list"], json!([null, 0.30000000000000004, null, null]));
     }
@@ -221,9 +221,9 @@ mod tests {
 
     #[test]
     fn a_result_without_fields_or_with_fields_of_the_envelope_is_refused() {
-        let list = Document::new("lsq", &[], &[], &json!([1, 2]));
+        let list = JsonDocument::new("lsq", &[], &[], &json!([1, 2]));
         assert!(matches!(list, Err(JsonError::NotAnObject { found, .. }) if found == "a list"));
-        let twice = Document::new("lsq", &[], &[], &json!({"version": 3}));
+        let twice = JsonDocument::new("lsq", &[], &[], &json!({"version": 3}));
         assert!(matches!(twice, Err(JsonError::FieldTaken { field, .. }) if field == "version"));
     }
 }

@@ -18,4 +18,7 @@ pub mod usual;
 mod value;
 mod words;
 
-pub use value::{Detail, Figure, FoundLine, Headline, Report, Screen, Tone, Writer};
+pub use value::{
+    FigureTone, FoundLine, Report, ReportDetail, TerminalScreen, VerdictFigure, VerdictHeadline,
+    Writer,
+};

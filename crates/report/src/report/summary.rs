@@ -1,6 +1,6 @@
 //! The table that most commands end with: torque errors by joint, all of them or the largest.
 
-use super::table::{Align, Columns, Table};
+use super::table::{CellAlignment, Columns, Table};
 use super::value::Writer;
 use super::words;
 use cft_ident_core::number;
@@ -50,7 +50,7 @@ pub(super) fn torque_errors<'a>(
         .percent("all rows", |e| e.relative_error)
         .digits("largest", 3, |e| e.max_abs)
         .numbers("R2", |e| words::r2(e.r2))
-        .column(Align::Right, "samples", |e| e.samples.to_string())
+        .column(CellAlignment::Right, "samples", |e| e.samples.to_string())
         .into()
 }
 

@@ -18,7 +18,7 @@ const GAPS: [usize; 2] = [2, 1];
 
 /// Where the cells of a column line up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Align {
+pub enum CellAlignment {
     /// Words: at the left, wrapped at spaces when the table is too wide.
     Left,
     /// Whole numbers and short marks: at the right.
@@ -32,13 +32,13 @@ pub enum Align {
 pub struct Table {
     /// Empty for none.
     caption: String,
-    columns: Vec<(String, Align)>,
+    columns: Vec<(String, CellAlignment)>,
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
     /// A table with these headers.
-    pub fn new(columns: &[(&str, Align)]) -> Self {
+    pub fn new(columns: &[(&str, CellAlignment)]) -> Self {
         let columns = columns.iter();
         Table {
             caption: String::new(),
@@ -75,7 +75,7 @@ impl Table {
 
     /// Widths of the columns and the gap between them, after words were narrowed to fit [`WIDTH`].
     fn widths(&self, rows: &[Vec<String>], room: usize) -> (Vec<usize>, usize) {
-        let natural = |(j, (name, _)): (usize, &(String, Align))| {
+        let natural = |(j, (name, _)): (usize, &(String, CellAlignment))| {
             let cells = rows.iter().map(|row| length(&row[j]));
             cells.fold(length(name), usize::max)
         };
@@ -93,7 +93,7 @@ impl Table {
         while !fits(&widths, gap, room) {
             // The widest column of words gives first, down to the longest of them.
             let widest = (0..widths.len())
-                .filter(|&j| self.columns[j].1 == Align::Left)
+                .filter(|&j| self.columns[j].1 == CellAlignment::Left)
                 .filter(|&j| widths[j] > NARROWEST.max(length(&self.columns[j].0)))
                 .max_by_key(|&j| widths[j]);
             let Some(widest) = widest else { break };
@@ -115,8 +115,10 @@ impl Table {
             }
             let padding = " ".repeat(widths[j].saturating_sub(length(cell)));
             match self.columns[j].1 {
-                Align::Left => line.extend([cell.as_str(), &padding]),
-                Align::Right | Align::Decimal => line.extend([padding.as_str(), cell]),
+                CellAlignment::Left => line.extend([cell.as_str(), &padding]),
+                CellAlignment::Right | CellAlignment::Decimal => {
+                    line.extend([padding.as_str(), cell])
+                }
             }
         }
         writeln!(f, "{}", line.trim_end())
@@ -131,7 +133,7 @@ impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut rows = self.rows.clone();
         for (j, (_, align)) in self.columns.iter().enumerate() {
-            if *align == Align::Decimal {
+            if *align == CellAlignment::Decimal {
                 line_up(&mut rows, j);
             }
         }
@@ -150,7 +152,7 @@ impl fmt::Display for Table {
         for row in &rows {
             let cells = row.iter().zip(&widths).zip(&self.columns);
             let lines = cells.map(|((cell, &width), (_, align))| match align {
-                Align::Left => wrapped(cell, width),
+                CellAlignment::Left => wrapped(cell, width),
                 _ => vec![cell.clone()],
             });
             let lines: Vec<Vec<String>> = lines.collect();
@@ -179,7 +181,7 @@ impl<R: Copy> Columns<R> {
 
     pub fn column<S: AsRef<str>>(
         mut self,
-        align: Align,
+        align: CellAlignment,
         name: &str,
         cell: impl Fn(R) -> S,
     ) -> Self {
@@ -191,11 +193,11 @@ impl<R: Copy> Columns<R> {
     }
 
     pub fn words<S: AsRef<str>>(self, name: &str, cell: impl Fn(R) -> S) -> Self {
-        self.column(Align::Left, name, cell)
+        self.column(CellAlignment::Left, name, cell)
     }
 
     pub fn numbers<S: AsRef<str>>(self, name: &str, cell: impl Fn(R) -> S) -> Self {
-        self.column(Align::Decimal, name, cell)
+        self.column(CellAlignment::Decimal, name, cell)
     }
 
     /// Two columns of numbers whose cells are made together.
@@ -372,10 +374,10 @@ mod tests {
     #[test]
     fn numbers_line_up_at_the_point_and_words_at_the_left() {
         let mut table = Table::new(&[
-            ("name", Align::Left),
-            ("theta", Align::Right),
-            ("value", Align::Decimal),
-            ("unit", Align::Left),
+            ("name", CellAlignment::Left),
+            ("theta", CellAlignment::Right),
+            ("value", CellAlignment::Decimal),
+            ("unit", CellAlignment::Left),
         ])
         .caption("Friction of q1");
         table.row(["viscous", "13", "13.521", "N s/m"]);
@@ -441,7 +443,7 @@ slope_2       16         -
 
     #[test]
     fn numbers_that_do_not_fit_move_together_before_they_leave_the_terminal() {
-        let mut table = Table::new(&[("a", Align::Right); 8]);
+        let mut table = Table::new(&[("a", CellAlignment::Right); 8]);
         table.row(["123456789"; 8]);
         let text = table.to_string();
         assert!(text.lines().all(|line| line.len() == 79), "{text}");
@@ -476,7 +478,7 @@ slope_2       16         -
 
     #[test]
     fn control_characters_in_a_name_are_shown() {
-        let mut table = Table::new(&[("channel", Align::Left)]);
+        let mut table = Table::new(&[("channel", CellAlignment::Left)]);
         table.row(["q1\u{1b}[2J"]);
         assert!(table.to_string().contains("q1\\u{1b}[2J"));
     }

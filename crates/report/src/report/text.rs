@@ -1,41 +1,44 @@
 //! A report as a terminal shows it: tables and paragraphs as wide as the window, without colour.
 
 use super::table::{hanging_in, joined};
-use super::value::{Detail, FoundLine, Headline, Part, Report, Screen, Shown, Tone};
+use super::value::{
+    FigureTone, FoundLine, PartVisibility, Report, ReportDetail, ReportPart, TerminalScreen,
+    VerdictHeadline,
+};
 
 impl Report {
     /// All that a terminal can show of the report, ending in a line end.
     pub fn text(&self) -> String {
-        self.text_for(Screen::of(Detail::Full))
+        self.text_for(TerminalScreen::of(ReportDetail::Full))
     }
 
     /// The report for a terminal, ending in a line end.
-    pub fn text_for(&self, Screen { detail, width }: Screen) -> String {
+    pub fn text_for(&self, TerminalScreen { detail, width }: TerminalScreen) -> String {
         let shown = |part| shown(part, width);
-        if detail == Detail::Full {
-            let parts = self.parts(&[Shown::Terminal, Shown::Detail]);
+        if detail == ReportDetail::Full {
+            let parts = self.parts(&[PartVisibility::Terminal, PartVisibility::Detail]);
             return parts.map(shown).collect();
         }
-        let verdicts = self.parts(&[Shown::Terminal, Shown::Brief]);
+        let verdicts = self.parts(&[PartVisibility::Terminal, PartVisibility::Brief]);
         let verdicts = verdicts.filter(|part| part.is_verdict());
         let brief: String = verdicts.map(shown).collect();
-        if detail == Detail::Brief && !brief.is_empty() {
+        if detail == ReportDetail::Brief && !brief.is_empty() {
             return brief;
         }
-        let parts = self.parts(&[Shown::Terminal, Shown::Usual]);
+        let parts = self.parts(&[PartVisibility::Terminal, PartVisibility::Usual]);
         let mut text: String = parts.map(shown).collect();
-        if self.parts(&[Shown::Detail]).count() > self.parts(&[]).count() {
+        if self.parts(&[PartVisibility::Detail]).count() > self.parts(&[]).count() {
             text += "--verbose shows more\n";
         }
         text
     }
 }
 
-fn shown(part: &Part, width: usize) -> String {
+fn shown(part: &ReportPart, width: usize) -> String {
     let hanging = |head: &str, text: &str, indent| hanging_in(width, head, text, indent);
     match part {
-        Part::Headline(headline) => figures(headline, width),
-        Part::Found(findings) => {
+        ReportPart::Headline(headline) => figures(headline, width),
+        ReportPart::Found(findings) => {
             let grades = findings.iter().map(|f| f.grade.chars().count());
             let margin = grades.max().unwrap_or(0) + GAP;
             // beside a narrow column of words a window of a phone has no room
@@ -46,17 +49,17 @@ fn shown(part: &Part, width: usize) -> String {
             };
             findings.iter().map(line).collect()
         }
-        Part::Next { text, command } => {
+        ReportPart::Next { text, command } => {
             let command = command.as_ref().map(|c| command_lines(c, width));
             hanging("", text, 2) + &command.unwrap_or_default()
         }
-        Part::Verdict { text, .. } => hanging("", text, 0),
-        Part::Heading(text) | Part::Line(text) => format!("{text}\n"),
-        Part::Paragraph(text) => hanging("", text, 2),
-        Part::Note { head, text, margin } => hanging(head, text, *margin),
-        Part::List(items) => items.iter().map(|item| hanging("  ", item, 4)).collect(),
-        Part::Table(table) => format!("{table:width$}"),
-        Part::Code(command) => command_lines(command, width),
+        ReportPart::Verdict { text, .. } => hanging("", text, 0),
+        ReportPart::Heading(text) | ReportPart::Line(text) => format!("{text}\n"),
+        ReportPart::Paragraph(text) => hanging("", text, 2),
+        ReportPart::Note { head, text, margin } => hanging(head, text, *margin),
+        ReportPart::List(items) => items.iter().map(|item| hanging("  ", item, 4)).collect(),
+        ReportPart::Table(table) => format!("{table:width$}"),
+        ReportPart::Code(command) => command_lines(command, width),
         // pictures, and text that a page folds away
         _ => String::new(),
     }
@@ -70,9 +73,9 @@ const NARROW: usize = 60;
 pub const BETWEEN: &str = "  |  ";
 
 /// The figures in one line where they fit, and of what they are.
-fn figures(headline: &Headline, width: usize) -> String {
+fn figures(headline: &VerdictHeadline, width: usize) -> String {
     let each = headline.figures.iter().map(|f| match f.tone {
-        Tone::Plain => format!("{} {}", f.label, f.value),
+        FigureTone::Plain => format!("{} {}", f.label, f.value),
         tone => format!("{} {} ({})", f.label, f.value, tone.word()),
     });
     let each: Vec<String> = each.collect();
@@ -110,7 +113,7 @@ fn command_lines(command: &str, width: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::table::WIDTH;
-    use super::super::value::Figure;
+    use super::super::value::VerdictFigure;
     use super::*;
 
     #[test]
@@ -152,40 +155,46 @@ mod tests {
         report.detail().line("all 58 parameters");
         report.usual().line("six of them");
         report.terminal().line("written: a.toml");
-        assert_eq!(report.text_for(Screen::of(Detail::Brief)), "it holds\n");
         assert_eq!(
-            report.text_for(Screen::of(Detail::Usual)),
+            report.text_for(TerminalScreen::of(ReportDetail::Brief)),
+            "it holds\n"
+        );
+        assert_eq!(
+            report.text_for(TerminalScreen::of(ReportDetail::Usual)),
             "it holds\nsix of them\nwritten: a.toml\n--verbose shows more\n"
         );
         assert_eq!(
-            report.text_for(Screen::of(Detail::Full)),
+            report.text_for(TerminalScreen::of(ReportDetail::Full)),
             "it holds\nall 58 parameters\nwritten: a.toml\n"
         );
         report.brief().verdict("in short", true);
         assert_eq!(
-            report.text_for(Screen::of(Detail::Brief)),
+            report.text_for(TerminalScreen::of(ReportDetail::Brief)),
             "it holds\nin short\n"
         );
         assert!(!report.text().contains("in short"));
         let mut plain = Report::new("title");
         plain.terminal().line("no verdict");
-        assert_eq!(plain.text_for(Screen::of(Detail::Brief)), "no verdict\n");
+        assert_eq!(
+            plain.text_for(TerminalScreen::of(ReportDetail::Brief)),
+            "no verdict\n"
+        );
     }
 
     #[test]
     fn a_verdict_is_figures_then_what_was_found_then_the_next_step() {
-        let figure = |label, value: &str, tone| Figure {
+        let figure = |label, value: &str, tone| VerdictFigure {
             label,
             value: value.to_owned(),
             tone,
         };
         let mut report = Report::new("title");
         let mut all = report.everywhere();
-        all.headline(Headline {
+        all.headline(VerdictHeadline {
             figures: vec![
-                figure("before", "10.3 %", Tone::Plain),
-                figure("after", "8.52 %", Tone::Better),
-                figure("usual", "3.1 to 13 %", Tone::Plain),
+                figure("before", "10.3 %", FigureTone::Plain),
+                figure("after", "8.52 %", FigureTone::Better),
+                figure("usual", "3.1 to 13 %", FigureTone::Plain),
             ],
             of: "torque error on held-out data".to_owned(),
         });
@@ -194,8 +203,8 @@ mod tests {
         all.found(vec![FoundLine { grade, text }]);
         all.next("Next: log more.", None);
         let narrow = |width| {
-            report.text_for(Screen {
-                detail: Detail::Usual,
+            report.text_for(TerminalScreen {
+                detail: ReportDetail::Usual,
                 width,
             })
         };
@@ -205,6 +214,9 @@ mod tests {
              indicated  play in the gear of q1\nNext: log more.\n"
         );
         assert!(narrow(40).starts_with("before 10.3 %\nafter 8.52 % (better)\nusual"));
-        assert_eq!(narrow(80), report.text_for(Screen::of(Detail::Brief)));
+        assert_eq!(
+            narrow(80),
+            report.text_for(TerminalScreen::of(ReportDetail::Brief))
+        );
     }
 }

@@ -45,7 +45,7 @@ pub(crate) struct TracePanel {
 
 /// One log in one form, of which a page shows one at a time.
 #[derive(Debug)]
-pub(crate) struct Trace {
+pub(crate) struct LogTrace {
     /// Name in the list of traces.
     pub name: String,
     /// Time [s], rising.
@@ -57,14 +57,14 @@ pub(crate) struct Trace {
 
 /// The traces of one figure; the first is shown first.
 #[derive(Debug)]
-pub(crate) struct Traces {
+pub(crate) struct FigureTraces {
     /// For a screen reader.
     pub label: String,
     /// Traces with the same lines.
-    pub traces: Vec<Trace>,
+    pub traces: Vec<LogTrace>,
 }
 
-impl Traces {
+impl FigureTraces {
     /// The data as the viewer reads them, safe inside a script element.
     pub(super) fn data(&self) -> String {
         let most = self.most_samples();
@@ -77,7 +77,7 @@ impl Traces {
     /// Samples that a trace may have for all of them to fit.
     fn most_samples(&self) -> usize {
         let longest = self.traces.iter().map(|t| t.t.len()).max().unwrap_or(0);
-        let size = |t: &Trace, most| t.t.len().min(most) * (4 + 2 * t.lines().count());
+        let size = |t: &LogTrace, most| t.t.len().min(most) * (4 + 2 * t.lines().count());
         let bytes = |most: usize| self.traces.iter().map(|t| size(t, most)).sum::<usize>();
         let mut most = longest;
         while bytes(most) > MOST_BYTES && most > 16 {
@@ -87,13 +87,13 @@ impl Traces {
     }
 }
 
-impl Trace {
+impl LogTrace {
     fn lines(&self) -> impl Iterator<Item = &TraceLine> {
         self.panels.iter().flat_map(|panel| &panel.lines)
     }
 
     fn view(&self, most: usize) -> Value {
-        let buckets = Buckets::of(self.t.len(), &self.breaks, most);
+        let buckets = TraceBuckets::of(self.t.len(), &self.breaks, most);
         let (t, [from, to]) = encode::times(&buckets.times(&self.t));
         let line = |line: &TraceLine| {
             let (data, [from, to]) = encode::values(&buckets.extremes(&line.values));
@@ -119,7 +119,7 @@ impl Trace {
 }
 
 /// Runs of consecutive samples, each to become at most two, none across a break.
-struct Buckets {
+struct TraceBuckets {
     /// First sample of each and the end of the last.
     bounds: Vec<usize>,
     /// Buckets that begin a stretch.
@@ -128,7 +128,7 @@ struct Buckets {
     whole: bool,
 }
 
-impl Buckets {
+impl TraceBuckets {
     fn of(samples: usize, breaks: &[usize], most: usize) -> Self {
         let whole = samples <= most;
         let size = match whole {
@@ -145,7 +145,7 @@ impl Buckets {
             bounds.extend((pair[0]..pair[1]).step_by(size));
         }
         bounds.push(samples);
-        Buckets {
+        TraceBuckets {
             bounds,
             begins,
             whole,
@@ -195,7 +195,7 @@ impl Buckets {
 }
 
 #[cfg(test)]
-impl Traces {
+impl FigureTraces {
     /// Two samples, every word of it `text`.
     pub(super) fn sample(text: &str) -> Self {
         let line = TraceLine {
@@ -211,9 +211,9 @@ impl Traces {
             limits: None,
             lines: vec![line],
         };
-        Traces {
+        FigureTraces {
             label: text.into(),
-            traces: vec![Trace {
+            traces: vec![LogTrace {
                 name: text.into(),
                 t: vec![0.0, 1.0],
                 breaks: vec![0],
@@ -233,7 +233,7 @@ mod tests {
         values[333] = 9.0;
         values[700] = -9.0;
         values[20..40].fill(f64::NAN);
-        let buckets = Buckets::of(1000, &[0, 501], 100);
+        let buckets = TraceBuckets::of(1000, &[0, 501], 100);
         assert!(buckets.ranges().all(|r| r.end <= 501 || r.start >= 501));
         let t: Vec<f64> = (0..1000).map(f64::from).collect();
         let thinned = buckets.extremes(&values);
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn a_minute_of_four_joints_is_kept_whole_and_an_hour_still_fits() {
         let of = |samples: usize| {
-            let mut traces = Traces::sample("q");
+            let mut traces = FigureTraces::sample("q");
             let trace = &mut traces.traces[0];
             trace.t = (0..samples).map(|k| k as f64).collect();
             let panel = &mut trace.panels[0];
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn words_from_a_file_cannot_leave_the_script_element() {
-        let data = Traces::sample("</script><!--").data();
+        let data = FigureTraces::sample("</script><!--").data();
         assert!(!data.contains('<'));
         let back: Value = serde_json::from_str(&data).unwrap();
         assert_eq!(back["views"][0]["panels"][0]["name"], "</script><!--");

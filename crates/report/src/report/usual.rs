@@ -5,7 +5,7 @@ use cft_ident_logs::log::TorqueIs;
 
 /// How the torques of a published figure were measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measured {
+pub enum TorqueMeasurement {
     /// Sensors at the joints.
     Sensors,
     /// Currents of the motors, or commands to them.
@@ -14,7 +14,7 @@ pub enum Measured {
 
 /// The torques over which an error is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Over {
+pub enum ErrorScope {
     /// Norm of the error of all joints over the norm of their torques.
     All,
     /// Root mean square of the errors of the joints.
@@ -23,10 +23,10 @@ pub enum Over {
 
 /// A published relative error of torques.
 #[derive(Debug, Clone, Copy)]
-pub struct Published {
+pub struct PublishedError {
     pub machine: &'static str,
-    pub measured: Measured,
-    pub over: Over,
+    pub measured: TorqueMeasurement,
+    pub over: ErrorScope,
     /// Error of the data that were fitted, as a fraction.
     pub fitted: Option<f64>,
     /// Error of other data, as a fraction.
@@ -35,51 +35,51 @@ pub struct Published {
 }
 
 /// The figures, one machine a row.
-pub const PUBLISHED: [Published; 6] = [
-    Published {
+pub const PUBLISHED: [PublishedError; 6] = [
+    PublishedError {
         machine: "Franka Emika Panda, seven joints",
-        measured: Measured::Sensors,
-        over: Over::All,
+        measured: TorqueMeasurement::Sensors,
+        over: ErrorScope::All,
         fitted: Some(0.0141),
         unseen: None,
         source: "Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca 2019, supplement",
     },
-    Published {
+    PublishedError {
         machine: "Rokae xMate7p, seven joints",
-        measured: Measured::Sensors,
-        over: Over::All,
+        measured: TorqueMeasurement::Sensors,
+        over: ErrorScope::All,
         fitted: Some(0.0250),
         unseen: Some(0.0319),
         source: "github.com/NKU-ZiXuan/xMate7p_dyn_ident, commit 7d8c9246, at 1 kHz",
     },
-    Published {
+    PublishedError {
         machine: "EMPS, one axis",
-        measured: Measured::Currents,
-        over: Over::All,
+        measured: TorqueMeasurement::Currents,
+        over: ErrorScope::All,
         fitted: Some(0.040834),
         unseen: Some(0.059824),
         source: "Janot, Gautier and Brunot 2019, published with the logs",
     },
-    Published {
+    PublishedError {
         machine: "Universal Robots UR10e, six joints",
-        measured: Measured::Currents,
-        over: Over::All,
+        measured: TorqueMeasurement::Currents,
+        over: ErrorScope::All,
         fitted: Some(0.0400),
         unseen: Some(0.0308),
         source: "github.com/shamilmamedov/dynamic_calibration, commit 11af40e7",
     },
-    Published {
+    PublishedError {
         machine: "Staubli TX40, six joints",
-        measured: Measured::Currents,
-        over: Over::All,
+        measured: TorqueMeasurement::Currents,
+        over: ErrorScope::All,
         fitted: Some(0.073),
         unseen: None,
         source: "github.com/thanhndv212/figaroh-examples, commit c0b5c7f0",
     },
-    Published {
+    PublishedError {
         machine: "Universal Robots UR10, six joints",
-        measured: Measured::Currents,
-        over: Over::Joints,
+        measured: TorqueMeasurement::Currents,
+        over: ErrorScope::Joints,
         fitted: None,
         unseen: Some(0.129),
         source: "weighted least squares on the log of github.com/unisa-acg/inverse-dynamics-solver: \
@@ -88,7 +88,7 @@ pub const PUBLISHED: [Published; 6] = [
 ];
 
 /// Least and largest published error.
-pub(super) fn range(measured: Measured) -> [f64; 2] {
+pub(super) fn range(measured: TorqueMeasurement) -> [f64; 2] {
     let rows = PUBLISHED.iter().filter(|row| row.measured == measured);
     let errors = rows.flat_map(|row| row.fitted.into_iter().chain(row.unseen));
     errors.fold([f64::INFINITY, 0.0], |[least, most], error| {
@@ -107,7 +107,10 @@ fn of_motors(torque_is: Option<TorqueIs>) -> bool {
 
 /// Least and largest error that is usual where torques are these; of both kinds where they may be sensors'.
 pub(super) fn band(torque_is: Option<TorqueIs>) -> [f64; 2] {
-    let (currents, sensors) = (range(Measured::Currents), range(Measured::Sensors));
+    let (currents, sensors) = (
+        range(TorqueMeasurement::Currents),
+        range(TorqueMeasurement::Sensors),
+    );
     match of_motors(torque_is) {
         true => currents,
         false => [sensors[0].min(currents[0]), sensors[1].max(currents[1])],
@@ -115,21 +118,22 @@ pub(super) fn band(torque_is: Option<TorqueIs>) -> [f64; 2] {
 }
 
 /// Errors that are usual, as a picture has them.
-pub(crate) struct Usual {
+pub(crate) struct UsualErrors {
     /// Least and largest.
     pub band: [f64; 2],
     pub words: String,
 }
 
-fn percent(measured: Measured) -> String {
+fn percent(measured: TorqueMeasurement) -> String {
     let [least, most] = range(measured).map(|error| number::significant(100.0 * error, 2));
     format!("{least} to {most} %")
 }
 
 /// The band of a picture, with its kinds.
-pub(super) fn drawn(torque_is: Option<TorqueIs>) -> Usual {
-    let [sensors, currents] = [Measured::Sensors, Measured::Currents].map(percent);
-    Usual {
+pub(super) fn drawn(torque_is: Option<TorqueIs>) -> UsualErrors {
+    let [sensors, currents] =
+        [TorqueMeasurement::Sensors, TorqueMeasurement::Currents].map(percent);
+    UsualErrors {
         band: band(torque_is),
         words: match of_motors(torque_is) {
             true => format!("usual for motor currents: {currents}"),

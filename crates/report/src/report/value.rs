@@ -2,13 +2,13 @@
 //! and a page are two renderings of it ([`super::text`], [`super::page`]); each part says where it is
 //! shown, since a page has room for more.
 
-use super::figure::Cells;
+use super::figure::PictureGroup;
 use super::table::{Table, WIDTH};
-use super::traces::Traces;
+use super::traces::FigureTraces;
 
 /// Where a part is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shown {
+pub(super) enum PartVisibility {
     Everywhere,
     Terminal,
     /// On a terminal that is to show little.
@@ -22,7 +22,7 @@ pub(super) enum Shown {
 
 /// How much of a report a terminal shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Detail {
+pub enum ReportDetail {
     /// The verdict; of a report without one what is usual.
     Brief,
     /// About a screen.
@@ -34,7 +34,7 @@ pub enum Detail {
 
 /// What a figure of a verdict says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tone {
+pub enum FigureTone {
     Plain,
     Better,
     Worse,
@@ -42,30 +42,30 @@ pub enum Tone {
     High,
 }
 
-impl Tone {
+impl FigureTone {
     /// The word that stands behind the figure; a terminal without colour has no other sign.
     pub fn word(self) -> &'static str {
         match self {
-            Tone::Plain => "",
-            Tone::Better => "better",
-            Tone::Worse => "worse",
-            Tone::High => "high",
+            FigureTone::Plain => "",
+            FigureTone::Better => "better",
+            FigureTone::Worse => "worse",
+            FigureTone::High => "high",
         }
     }
 }
 
 /// A figure of a verdict with the word above it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Figure {
+pub struct VerdictFigure {
     pub label: &'static str,
     pub value: String,
-    pub tone: Tone,
+    pub tone: FigureTone,
 }
 
 /// The figures of a verdict: few, and of what they are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Headline {
-    pub figures: Vec<Figure>,
+pub struct VerdictHeadline {
+    pub figures: Vec<VerdictFigure>,
     pub of: String,
 }
 
@@ -78,24 +78,24 @@ pub struct FoundLine {
 
 /// What a terminal shows of a report, and in how many columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Screen {
-    pub detail: Detail,
+pub struct TerminalScreen {
+    pub detail: ReportDetail,
     pub width: usize,
 }
 
-impl Screen {
+impl TerminalScreen {
     /// A screen of the usual width.
-    pub fn of(detail: Detail) -> Self {
+    pub fn of(detail: ReportDetail) -> Self {
         let width = WIDTH;
-        Screen { detail, width }
+        TerminalScreen { detail, width }
     }
 }
 
 /// One part of a report.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Part {
+pub(super) enum ReportPart {
     /// The figures of the verdict.
-    Headline(Headline),
+    Headline(VerdictHeadline),
     /// What was found.
     Found(Vec<FoundLine>),
     /// The next step, and the command for it.
@@ -124,11 +124,11 @@ pub(super) enum Part {
     /// An SVG document.
     Figure(String),
     /// Small pictures that belong together.
-    Figures(Cells),
+    Figures(PictureGroup),
     /// Small pictures that are folded away.
     Folded {
         summary: String,
-        cells: Cells,
+        cells: PictureGroup,
     },
     /// Series over time as the page's viewer reads them, and the SVG document that is shown without a script.
     Traces {
@@ -144,10 +144,10 @@ pub(super) enum Part {
     },
 }
 
-impl Part {
+impl ReportPart {
     /// Whether it belongs to the verdict, which a terminal shows even where little is asked for.
     pub(super) fn is_verdict(&self) -> bool {
-        use Part::{Found, Headline, Next, Verdict};
+        use ReportPart::{Found, Headline, Next, Verdict};
         matches!(self, Headline(_) | Found(_) | Next { .. } | Verdict { .. })
     }
 }
@@ -156,7 +156,7 @@ impl Part {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     pub(super) title: String,
-    parts: Vec<(Shown, Part)>,
+    parts: Vec<(PartVisibility, ReportPart)>,
 }
 
 impl Report {
@@ -169,43 +169,47 @@ impl Report {
     }
 
     /// The parts that are shown in one of these places or everywhere, in their order.
-    pub(super) fn parts<'a>(&'a self, places: &'a [Shown]) -> impl Iterator<Item = &'a Part> {
-        let there = |shown: Shown| shown == Shown::Everywhere || places.contains(&shown);
+    pub(super) fn parts<'a>(
+        &'a self,
+        places: &'a [PartVisibility],
+    ) -> impl Iterator<Item = &'a ReportPart> {
+        let there =
+            |shown: PartVisibility| shown == PartVisibility::Everywhere || places.contains(&shown);
         let parts = self.parts.iter().filter(move |(shown, _)| there(*shown));
         parts.map(|(_, part)| part)
     }
 
     /// Adds parts that are shown everywhere.
     pub fn everywhere(&mut self) -> Writer<'_> {
-        self.shown(Shown::Everywhere)
+        self.shown(PartVisibility::Everywhere)
     }
 
     /// Adds parts that only a terminal shows.
     pub fn terminal(&mut self) -> Writer<'_> {
-        self.shown(Shown::Terminal)
+        self.shown(PartVisibility::Terminal)
     }
 
     /// Adds a verdict that a terminal shows where little is asked for, and others have said in more words.
     pub fn brief(&mut self) -> Writer<'_> {
-        self.shown(Shown::Brief)
+        self.shown(PartVisibility::Brief)
     }
 
     /// Adds parts in short, which a terminal leaves out where it shows everything.
     pub fn usual(&mut self) -> Writer<'_> {
-        self.shown(Shown::Usual)
+        self.shown(PartVisibility::Usual)
     }
 
     /// Adds parts that a terminal shows where everything is asked for.
     pub fn detail(&mut self) -> Writer<'_> {
-        self.shown(Shown::Detail)
+        self.shown(PartVisibility::Detail)
     }
 
     /// Adds parts that only a page has room for.
     pub fn page(&mut self) -> Writer<'_> {
-        self.shown(Shown::Page)
+        self.shown(PartVisibility::Page)
     }
 
-    fn shown(&mut self, shown: Shown) -> Writer<'_> {
+    fn shown(&mut self, shown: PartVisibility) -> Writer<'_> {
         let parts = &mut self.parts;
         Writer { parts, shown }
     }
@@ -214,48 +218,48 @@ impl Report {
 /// Adds parts to a report that are shown in one place.
 #[derive(Debug)]
 pub struct Writer<'a> {
-    parts: &'a mut Vec<(Shown, Part)>,
-    shown: Shown,
+    parts: &'a mut Vec<(PartVisibility, ReportPart)>,
+    shown: PartVisibility,
 }
 
 impl Writer<'_> {
-    fn push(&mut self, part: Part) {
+    fn push(&mut self, part: ReportPart) {
         self.parts.push((self.shown, part));
     }
 
     pub fn verdict(&mut self, text: &str, good: bool) {
         let text = text.to_owned();
-        self.push(Part::Verdict { text, good });
+        self.push(ReportPart::Verdict { text, good });
     }
 
     /// The figures of the verdict.
-    pub fn headline(&mut self, headline: Headline) {
-        self.push(Part::Headline(headline));
+    pub fn headline(&mut self, headline: VerdictHeadline) {
+        self.push(ReportPart::Headline(headline));
     }
 
     /// What was found; nothing where there is none.
     pub fn found(&mut self, findings: Vec<FoundLine>) {
         if !findings.is_empty() {
-            self.push(Part::Found(findings));
+            self.push(ReportPart::Found(findings));
         }
     }
 
     /// The next step.
     pub fn next(&mut self, text: &str, command: Option<String>) {
         let text = text.to_owned();
-        self.push(Part::Next { text, command });
+        self.push(ReportPart::Next { text, command });
     }
 
     pub fn heading(&mut self, text: &str) {
-        self.push(Part::Heading(text.to_owned()));
+        self.push(ReportPart::Heading(text.to_owned()));
     }
 
     pub fn paragraph(&mut self, text: &str) {
-        self.push(Part::Paragraph(text.to_owned()));
+        self.push(ReportPart::Paragraph(text.to_owned()));
     }
 
     pub fn note(&mut self, head: &str, text: &str, margin: usize) {
-        self.push(Part::Note {
+        self.push(ReportPart::Note {
             head: head.to_owned(),
             text: text.to_owned(),
             margin,
@@ -263,19 +267,19 @@ impl Writer<'_> {
     }
 
     pub fn line(&mut self, text: &str) {
-        self.push(Part::Line(text.to_owned()));
+        self.push(ReportPart::Line(text.to_owned()));
     }
 
     /// A list of sentences; nothing where there are none.
     pub fn list<S: AsRef<str>>(&mut self, items: impl IntoIterator<Item = S>) {
         let items: Vec<String> = items.into_iter().map(|i| i.as_ref().to_owned()).collect();
         if !items.is_empty() {
-            self.push(Part::List(items));
+            self.push(ReportPart::List(items));
         }
     }
 
     pub fn table(&mut self, table: impl Into<Table>) {
-        self.push(Part::Table(table.into()));
+        self.push(ReportPart::Table(table.into()));
     }
 
     /// A table below an empty line.
@@ -293,31 +297,31 @@ impl Writer<'_> {
     }
 
     pub(super) fn figure(&mut self, svg: String) {
-        self.push(Part::Figure(svg));
+        self.push(ReportPart::Figure(svg));
     }
 
     /// Small pictures that belong together.
-    pub(super) fn figures(&mut self, cells: Cells) {
-        self.push(Part::Figures(cells));
+    pub(super) fn figures(&mut self, cells: PictureGroup) {
+        self.push(ReportPart::Figures(cells));
     }
 
     /// Small pictures that are folded away.
-    pub(super) fn folded(&mut self, summary: String, cells: Cells) {
-        self.push(Part::Folded { summary, cells });
+    pub(super) fn folded(&mut self, summary: String, cells: PictureGroup) {
+        self.push(ReportPart::Folded { summary, cells });
     }
 
     /// Series over time, and the still picture that is shown without a script.
-    pub(super) fn traces(&mut self, traces: &Traces, still: String) {
+    pub(super) fn traces(&mut self, traces: &FigureTraces, still: String) {
         let data = traces.data();
-        self.push(Part::Traces { data, still });
+        self.push(ReportPart::Traces { data, still });
     }
 
     pub fn code(&mut self, text: &str) {
-        self.push(Part::Code(text.to_owned()));
+        self.push(ReportPart::Code(text.to_owned()));
     }
 
     pub(crate) fn details(&mut self, summary: &str, text: &str) {
-        self.push(Part::Details {
+        self.push(ReportPart::Details {
             summary: summary.to_owned(),
             text: text.to_owned(),
         });

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use cft_ident_core::effect::{Added, AugmentedModel, Role, Scene};
+use cft_ident_core::effect::{AugmentedModel, EffectScene, ModelEffect, Role};
 use cft_ident_core::math::gram::{gram, stride};
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch, rest};
 use cft_ident_core::robot::model::JointFriction;
@@ -223,7 +223,7 @@ fn add(
     // effects remember: their columns are those of the whole stretch
     let plain = (!model.effects.is_empty())
         .then(|| AugmentedModel::plain(model.model.clone()).torques(stretch));
-    let scene = Scene {
+    let scene = EffectScene {
         robot: &model.model.robot,
         theta: &model.model.theta,
         laws: &model.model.friction,
@@ -327,7 +327,7 @@ impl OfJoint {
     fn new(
         model: &AugmentedModel,
         layout: &Layout,
-        scene: &Scene,
+        scene: &EffectScene,
         (j, theta): (usize, Vec<usize>),
     ) -> Self {
         let mut places = theta.clone();
@@ -335,7 +335,7 @@ impl OfJoint {
         places.extend(first..first + friction);
         places.extend(layout.offset[j]);
         let mut added = Vec::new();
-        let here = |effect: &Added| is_linear(effect) && effect.place.touches(j);
+        let here = |effect: &ModelEffect| is_linear(effect) && effect.place.touches(j);
         let effects = model.effects.iter().zip(&layout.effects);
         for (effect, first) in effects.filter(|(effect, _)| here(effect)) {
             let columns = effect.columns(scene, j);
@@ -352,7 +352,7 @@ impl OfJoint {
     }
 }
 
-fn is_linear(effect: &Added) -> bool {
+fn is_linear(effect: &ModelEffect) -> bool {
     effect.law.entry.role != Role::Shift
 }
 

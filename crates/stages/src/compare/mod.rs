@@ -7,4 +7,6 @@ mod parameters;
 pub use errors::Difference;
 pub(crate) use errors::{ErrorDifferences, differences};
 pub(crate) use parameters::side_by_side;
-pub use parameters::{Apart, ParameterEstimate, ParameterPair, Reason, SideBySide};
+pub use parameters::{
+    ParameterEstimate, ParameterPair, SideBySide, UnpairedParameter, UnpairedReason,
+};

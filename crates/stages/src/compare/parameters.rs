@@ -46,7 +46,8 @@ pub struct ParameterPair {
 /// Why a parameter has no partner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Reason {
+#[schemars(rename = "Reason")]
+pub enum UnpairedReason {
     /// The other model has none of this name.
     Absent,
     /// The other model has one in another unit.
@@ -57,13 +58,14 @@ pub enum Reason {
 
 /// A parameter that one model has alone.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Apart {
+#[schemars(rename = "Apart")]
+pub struct UnpairedParameter {
     pub name: String,
     pub joint: Option<String>,
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
-    pub reason: Reason,
+    pub reason: UnpairedReason,
 }
 
 /// All parameters of two models.
@@ -71,8 +73,8 @@ pub struct Apart {
 pub struct SideBySide {
     /// What both have, in the order of the first.
     pub parameters: Vec<ParameterPair>,
-    pub only_in_a: Vec<Apart>,
-    pub only_in_b: Vec<Apart>,
+    pub only_in_a: Vec<UnpairedParameter>,
+    pub only_in_b: Vec<UnpairedParameter>,
 }
 
 /// A parameter, or a number of an effect.
@@ -111,16 +113,16 @@ pub(super) fn paired(ours: &[ParameterEntry], theirs: &[ParameterEntry]) -> Side
 fn partner<'a>(
     entry: &ParameterEntry,
     among: &'a [ParameterEntry],
-) -> Result<&'a ParameterEntry, Reason> {
+) -> Result<&'a ParameterEntry, UnpairedReason> {
     let mut same = among.iter();
     let found = same.find(|other| other.name == entry.name && other.joint == entry.joint);
-    let other = found.ok_or(Reason::Absent)?;
+    let other = found.ok_or(UnpairedReason::Absent)?;
     if other.unit != entry.unit {
-        return Err(Reason::OtherUnit);
+        return Err(UnpairedReason::OtherUnit);
     }
     match other.meaning == entry.meaning {
         true => Ok(other),
-        false => Err(Reason::OtherMeaning),
+        false => Err(UnpairedReason::OtherMeaning),
     }
 }
 
@@ -150,8 +152,8 @@ fn spread(estimate: &ParameterEstimate) -> Option<f64> {
     }
 }
 
-fn apart(entry: &ParameterEntry, reason: Reason) -> Apart {
-    Apart {
+fn apart(entry: &ParameterEntry, reason: UnpairedReason) -> UnpairedParameter {
+    UnpairedParameter {
         name: entry.name.clone(),
         joint: entry.joint.clone(),
         value: entry.estimate.value,

@@ -16,10 +16,10 @@ use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
-use crate::input::setup_file::Declared;
+use crate::input::setup_file::ChannelTables;
 use crate::input::unknowns::columns;
 use cft_ident_files::config::RobotFile;
-use cft_ident_files::config::correction::Edit;
+use cft_ident_files::config::correction::KeyEdit;
 
 /// What the check found, and the robot file that is right by it.
 #[derive(Debug, Clone, Default)]
@@ -28,7 +28,7 @@ pub struct CheckedSetup {
     /// The robot file with all that is sure put right; none where nothing is.
     pub corrected: Option<RobotFile>,
     /// What differs in it.
-    pub edits: Vec<Edit>,
+    pub edits: Vec<KeyEdit>,
     /// The robot as it is declared, with the torques that its drives do not exceed; none where there are none.
     pub limited: Option<LoggedRobot>,
 }
@@ -161,7 +161,7 @@ fn sampled(
 }
 
 fn checked(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
-    let declared = Declared::new(&machine.file, problem.channels.drive == Drive::Motors);
+    let declared = ChannelTables::new(&machine.file, problem.channels.drive == Drive::Motors);
     let edits = searched.correction.as_ref().map(|by| declared.edits(by));
     let edits = edits.unwrap_or_default();
     // what no line mends is refused and not put right

@@ -26,10 +26,10 @@ use crate::input::temperatures;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, FORMULA_NUMBERS, Heard, LogRole, ModelProposal,
-    ParameterPrior, Watch, Wishes,
+    self, DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisOptions, DiagnosisProgress,
+    DiagnosisWatch, FORMULA_NUMBERS, LogRole, ModelProposal, ParameterPrior,
 };
-use cft_ident_core::effect::{self, Added, AugmentedModel};
+use cft_ident_core::effect::{self, AugmentedModel, ModelEffect};
 use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::motion::ParallelFilters;
 use cft_ident_core::robot::drive::JointDrive;
@@ -46,7 +46,7 @@ pub struct DiagnoseSettings<'a> {
     /// The inertial parameters of the given model stay: finds payload, gain and tilt.
     pub keep: bool,
     /// What the user asks for besides.
-    pub wishes: Wishes,
+    pub wishes: DiagnosisOptions,
     /// Effects of the user's own, tried beside those that are known.
     pub candidates: Vec<CandidateSection>,
     /// The friction of the given model stays as it is; its covariance is in the deviations of the others.
@@ -107,7 +107,7 @@ impl<'a> DiagnoseSettings<'a> {
         DiagnoseSettings {
             model,
             keep: false,
-            wishes: Wishes::default(),
+            wishes: DiagnosisOptions::default(),
             candidates: Vec::new(),
             hold_friction: false,
         }
@@ -204,14 +204,14 @@ pub fn diagnose(
         (roles, settings),
     )?;
     let work = control.begin("search for effects", None);
-    let tell = |heard: Heard| {
+    let tell = |heard: DiagnosisProgress| {
         control.report(match heard {
-            Heard::Begin(part, steps) => Progress::Begin(part, Some(steps)),
-            Heard::Step => Progress::Advance(1),
-            Heard::End => Progress::End,
+            DiagnosisProgress::Begin(part, steps) => Progress::Begin(part, Some(steps)),
+            DiagnosisProgress::Step => Progress::Advance(1),
+            DiagnosisProgress::End => Progress::End,
         });
     };
-    let watch = Watch {
+    let watch = DiagnosisWatch {
         tell: &tell,
         stop: &|| control.stopped(),
     };
@@ -231,7 +231,7 @@ pub fn diagnose(
         own,
         control: control.clone(),
     };
-    let files: Mutex<Vec<(Vec<Added>, ModelFile)>> = Mutex::default();
+    let files: Mutex<Vec<(Vec<ModelEffect>, ModelFile)>> = Mutex::default();
     let failed: Mutex<Option<IdentifyError>> = Mutex::default();
     let refit = |proposal: &ModelProposal| {
         let made = refitting.file(proposal).and_then(|file| {
@@ -352,7 +352,7 @@ fn case(
     given: AugmentedModel,
     in_memory: &mut InMemory,
     (roles, settings): (Vec<LogRole>, &DiagnoseSettings),
-) -> Result<Case, IdentifyError> {
+) -> Result<DiagnosisCase, IdentifyError> {
     let processing = machine.settings();
     let filters = ParallelFilters::design(&processing, &in_memory.stretches)
         .map_err(|error| IdentifyError::motion(name, error))?;
@@ -373,7 +373,7 @@ fn case(
         let inertial = given.model.theta.len();
         moments.view((0, 0), (inertial, inertial)).into_owned()
     });
-    Ok(Case {
+    Ok(DiagnosisCase {
         in_use: refined(&settings.model.file, name)?,
         given,
         prior,

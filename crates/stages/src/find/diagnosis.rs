@@ -15,10 +15,10 @@ use crate::input::logged_robot::LoggedRobot;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
-    Dependence, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
+    FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal, SignalDependence,
     SplitErrors, StepStatus,
 };
-use cft_ident_core::effect::Added;
+use cft_ident_core::effect::ModelEffect;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::robot::Robot;
 
@@ -371,7 +371,7 @@ impl Diagnosed {
     }
 }
 
-fn dependence(names: &[String], found: &Dependence) -> ResidualDependence {
+fn dependence(names: &[String], found: &SignalDependence) -> ResidualDependence {
     let signals = found.signals.iter();
     ResidualDependence {
         joint: names[found.joint].clone(),
@@ -420,7 +420,7 @@ fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult
 }
 
 /// The option of `diagnose` that writes an effect.
-pub fn accept_option(effect: &Added, robot: &Robot) -> String {
+pub fn accept_option(effect: &ModelEffect, robot: &Robot) -> String {
     match effect.place.name(robot) {
         Some(joint) => format!("--accept {}:{joint}", effect.name()),
         None => format!("--accept {}", effect.name()),

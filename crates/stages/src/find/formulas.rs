@@ -7,9 +7,11 @@ use serde::Serialize;
 
 use super::diagnose::Diagnosed;
 use crate::input::logged_robot::LoggedRobot;
-use cft_ident_core::diagnose::{FormulaEnd, FoundEffect, FoundFormula, JointChange, Symmetry};
+use cft_ident_core::diagnose::{
+    FormulaEnd, FormulaSymmetry, FoundEffect, FoundFormula, JointChange,
+};
 use cft_ident_core::effect::EffectNumber;
-use cft_ident_core::effect::formula::{Definition, Shape};
+use cft_ident_core::effect::formula::{FormulaDefinition, FormulaShape};
 use cft_ident_core::judge::ErrorGain;
 use cft_ident_core::number;
 use cft_ident_core::robot::FormulaSignal;
@@ -80,7 +82,7 @@ pub struct FormulaResult {
     pub signals: Vec<String>,
     /// What kind of physics it is by its symmetries, in words.
     pub kind: String,
-    pub symmetry: Symmetry,
+    pub symmetry: FormulaSymmetry,
     /// Formula of each coefficient.
     pub formulas: BTreeMap<String, String>,
     /// Its numbers, by key.
@@ -104,9 +106,9 @@ pub struct FormulaResult {
 }
 
 /// A formula as a table of a candidates file.
-pub fn formula_section(definition: &Definition) -> CandidateSection {
+pub fn formula_section(definition: &FormulaDefinition) -> CandidateSection {
     let of = |k: usize| move |c: &[String; 3]| (c[0].clone(), c[k].clone());
-    let shape = |s: &Shape| {
+    let shape = |s: &FormulaShape| {
         let range = ShapeRange {
             from: s.range[0],
             to: s.range[1],

@@ -1,7 +1,7 @@
 //! The next motion to record, as a command to type: one that narrows what is weak in a model, or separates an effect
 //! from its like.
 
-use cft_ident_core::effect::{Added, Place};
+use cft_ident_core::effect::{EffectPlace, ModelEffect};
 use cft_ident_core::number;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::verdict::Verdict;
@@ -10,13 +10,13 @@ use cft_ident_files::config::model_file::Parameter;
 
 /// A motion of one joint alone, both ways at several speeds, where such a motion separates the effect; none where it
 /// takes a payload, a standstill, a motor alone or other sensors. `model` is the path as a shell takes it.
-pub fn separating_command(effect: &Added, robot: &Robot, model: &str) -> Option<String> {
+pub fn separating_command(effect: &ModelEffect, robot: &Robot, model: &str) -> Option<String> {
     effect.law.entry.ladder?;
     let joint = match effect.place {
         // the other joint alone
-        Place::Pair { of, .. } | Place::Geared { other: of, .. } => of,
-        Place::Joint(j) => j,
-        Place::Actuator(_) | Place::Actuators | Place::All => return None,
+        EffectPlace::Pair { of, .. } | EffectPlace::Geared { other: of, .. } => of,
+        EffectPlace::Joint(j) => j,
+        EffectPlace::Actuator(_) | EffectPlace::Actuators | EffectPlace::All => return None,
     };
     let aim = format!("{}:{}", effect.name(), robot.joint_names().get(joint)?);
     // strokes are laid around the width of a memory; the file may not hold an effect that is not sure
@@ -57,24 +57,24 @@ fn command(model: &str, aim: &str) -> String {
 mod tests {
     use super::*;
     use cft_ident_core::effect::law;
-    use cft_ident_core::robot::cft::{Setup, Structure};
+    use cft_ident_core::robot::cft::{LaboratorySetup, ParameterStructure};
 
     #[test]
     fn a_coupling_is_separated_by_the_other_joint_alone() {
-        let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
-        let of = |name: &str, place: Place| {
+        let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
+        let of = |name: &str, place: EffectPlace| {
             let law = law(&robot, name).unwrap();
             let (shape, linear) = (vec![0.0; law.shape.len()], vec![0.0; law.linear.len()]);
-            let effect = Added::new(law, place, shape, linear);
+            let effect = ModelEffect::new(law, place, shape, linear);
             separating_command(&effect, &robot, "m.toml")
         };
-        let coupling = of("coupling", Place::Pair { on: 1, of: 3 }).unwrap();
+        let coupling = of("coupling", EffectPlace::Pair { on: 1, of: 3 }).unwrap();
         assert!(
             coupling.contains("-m m.toml --for coupling:q5 "),
             "{coupling}"
         );
-        let play = of("backlash", Place::Joint(0)).unwrap();
+        let play = of("backlash", EffectPlace::Joint(0)).unwrap();
         assert!(play.contains("--for backlash:q1 "), "{play}");
-        assert_eq!(of("delay", Place::All), None);
+        assert_eq!(of("delay", EffectPlace::All), None);
     }
 }

@@ -3,7 +3,7 @@
 mod weights;
 
 use crate::input::logged_robot::LoggedRobot;
-use crate::input::setup_file::Declared;
+use crate::input::setup_file::ChannelTables;
 use crate::setup::{
     Alternative, Cause, Change, ChannelKind, Correction, DecidedBy, Drive, Finding, FindingKind,
     FindingSeverity, Found, FoundTorqueLimit, FrictionPower, LIMITS, Problem, Searched, Setting,
@@ -15,8 +15,8 @@ use cft_ident_core::number::{percent, significant};
 /// The entries of the key `setup`, and the joints whose friction drives them.
 pub(crate) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> SetupReport {
     let motors = problem.channels.drive == Drive::Motors;
-    let declared = Declared::new(&machine.file, motors);
-    let words = Words {
+    let declared = ChannelTables::new(&machine.file, motors);
+    let words = SetupWords {
         joints: machine.robot.joint_names(),
         names: declared.names(),
         declared,
@@ -64,8 +64,8 @@ fn power_unit(machine: &LoggedRobot, joint: usize) -> String {
     }
 }
 
-struct Words<'a> {
-    declared: Declared<'a>,
+struct SetupWords<'a> {
+    declared: ChannelTables<'a>,
     joints: &'a [String],
     /// Channels.
     names: Vec<String>,
@@ -73,13 +73,13 @@ struct Words<'a> {
 }
 
 /// A single change as it is written.
-struct Said {
+struct ChangeWords {
     entry: Alternative,
     declared: Setting,
     meaning: String,
 }
 
-impl Words<'_> {
+impl SetupWords<'_> {
     /// One entry for each joint whose sign or scale is wrong.
     fn findings(&self, found: &Found) -> Vec<Finding> {
         let tied = found.tied.iter().take(3);
@@ -147,7 +147,7 @@ impl Words<'_> {
     }
 
     /// What is said of a change.
-    fn said(&self, change: &Change) -> Said {
+    fn said(&self, change: &Change) -> ChangeWords {
         let name = |j: &usize| self.names[*j].clone();
         let one = |joints: &[usize]| match joints {
             [j] => Some(name(j)),
@@ -253,7 +253,7 @@ impl Words<'_> {
         };
         let [declared, found] = values;
         let remedy = self.remedy(change);
-        Said {
+        ChangeWords {
             entry: Alternative {
                 kind,
                 channel,
@@ -278,7 +278,7 @@ impl Words<'_> {
         let edits = self
             .declared
             .edits(&Correction::none(self.names.len()).with(change));
-        let line = |edit: &cft_ident_files::config::correction::Edit| {
+        let line = |edit: &cft_ident_files::config::correction::KeyEdit| {
             format!("`{}` in {}", edit.line(), edit.table())
         };
         edits.iter().map(line).collect::<Vec<_>>().join(", ")

@@ -17,9 +17,9 @@ use crate::input::model::{in_file, refined};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
 use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
-use cft_ident_core::effect::{Added, AugmentedModel};
+use cft_ident_core::effect::{AugmentedModel, ModelEffect};
 use cft_ident_core::inertia::verdict::verdict;
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::motion::FilterSettings;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::Verdict;
@@ -134,7 +134,7 @@ fn take(found: &mut IdentifiedDynamics, fit: &AxisFit) {
             fit.free.len()
         ));
     }
-    if fit.ending == Ending::IterationLimit {
+    if fit.ending == IterationEnding::IterationLimit {
         found.warnings.push(format!(
             "fit to the motion: did not settle in {} steps; its last result stands",
             fit.steps
@@ -167,9 +167,13 @@ fn motion_fit(machine: &LoggedRobot, fit: &AxisFit, (given, taken): (bool, bool)
 
 /// Effects as a model file holds them; what the fit left where it was is held.
 fn effects(machine: &LoggedRobot, model: &AugmentedModel, fit: &AxisFit) -> Vec<EffectSection> {
-    let mut first =
-        fit.covariance.nrows() - model.effects.iter().map(Added::parameters).sum::<usize>();
-    let of = |effect: &Added| {
+    let mut first = fit.covariance.nrows()
+        - model
+            .effects
+            .iter()
+            .map(ModelEffect::parameters)
+            .sum::<usize>();
+    let of = |effect: &ModelEffect| {
         let (n, shapes) = (effect.parameters(), effect.shape.len());
         let mut effect = effect.clone();
         let mut covariance = DMatrix::zeros(n, n);

@@ -5,17 +5,17 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::estimate::Estimated;
+use super::estimate::InertialEstimate;
 use crate::input::error::IdentifyError;
 use crate::input::logged_robot::LoggedRobot;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::inertia::feasible::{
-    ConsistencyProblem, Feasible, FrictionColumns, PRIOR_WEIGHT, feasible,
+    ConsistencyProblem, FeasibleParameters, FrictionColumns, PRIOR_WEIGHT, feasible,
 };
 use cft_ident_core::inertia::left_out::{FitsOnLeftOut, TrialLeftOut, left_out};
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
 use cft_ident_core::math::covariance::information_rows;
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::number;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::bodies::StandardMap;
@@ -38,7 +38,7 @@ pub struct ConsistentLinks {
     /// itself.
     pub duality_gap: f64,
     pub iterations: usize,
-    pub status: Ending,
+    pub status: IterationEnding,
     /// Links whose mass properties in the robot file no body can have, so that a plain body stands for them.
     pub impossible_priors: Vec<String>,
     /// The unknowns of the fit, in their order.
@@ -109,7 +109,7 @@ fn impossible(map: &StandardMap, bodies: &[Option<Body>], given: &[bool]) -> Vec
 fn links_and_drives(
     robot: &Robot,
     map: &StandardMap,
-    found: &Feasible,
+    found: &FeasibleParameters,
 ) -> (Vec<ConsistentLink>, Vec<DriveInertia>) {
     let links = map.links.iter().zip(&found.links).zip(&found.given);
     let link = |((name, s), given): ((&String, &[f64; STANDARD]), &bool)| {
@@ -151,12 +151,12 @@ fn write(links: &[ConsistentLink], drives: &[DriveInertia], model: &mut ModelFil
 
 /// Columns of viscous and Coulomb friction that are fitted, with the speed that each joint reached.
 fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColumns> {
-    let of = |(j, own): (usize, &Vec<Own>)| {
-        let at = |wanted: Own| own.iter().position(|own| *own == wanted);
+    let of = |(j, own): (usize, &Vec<JointTerm>)| {
+        let at = |wanted: JointTerm| own.iter().position(|own| *own == wanted);
         let first = columns.first_own(j);
         Some(FrictionColumns {
-            viscous: first + at(Own::Viscous)?,
-            coulomb: first + at(Own::Coulomb)?,
+            viscous: first + at(JointTerm::Viscous)?,
+            coulomb: first + at(JointTerm::Coulomb)?,
             speed: fastest[j],
         })
     };
@@ -167,7 +167,7 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
 /// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached.
 pub(crate) fn consistent(
     machine: &LoggedRobot,
-    estimated: &Estimated,
+    estimated: &InertialEstimate,
     fastest: &[f64],
 ) -> Result<ConsistentLinks, IdentifyError> {
     let map = machine.robot.standard_map();
@@ -247,7 +247,7 @@ impl ConsistentLinks {
                 self.impossible_priors.join(", ")
             ));
         }
-        if self.status == Ending::IterationLimit {
+        if self.status == IterationEnding::IterationLimit {
             out.push(format!(
                 "the search for physically consistent links ended before its optimum: the duality gap is {} of the sum of squares",
                 number::percent(self.duality_gap)

@@ -4,12 +4,12 @@ use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
-use crate::input::passes::{Passes, PositionFilter};
+use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::unknowns::{FittedUnknown, columns};
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::columns::RegressorColumns;
-use cft_ident_core::inertia::jumps::Jump;
-use cft_ident_core::inertia::solve::{Weighting, fit};
+use cft_ident_core::inertia::jumps::ResidualJump;
+use cft_ident_core::inertia::solve::{RowWeighting, fit};
 use cft_ident_core::number;
 use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::{RowFault, escape};
@@ -30,15 +30,15 @@ pub(crate) fn contacts(
         return Ok(Vec::new());
     }
     let own = machine.own_settings(logs, &[], control)?;
-    let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
+    let mut passes = LogPasses::new(machine, logs, control).each_by_itself(own);
     passes.read(PositionFilter::Declared, &columns(machine, None), None)?;
     passes.contacts()
 }
 
-impl Passes<'_> {
+impl LogPasses<'_> {
     /// The stretches that the first reading found, one sentence each.
     pub(crate) fn contacts(&self) -> Result<Vec<String>, IdentifyError> {
-        let shown = |(log, jump): &(usize, Jump)| {
+        let shown = |(log, jump): &(usize, ResidualJump)| {
             let log = &self.logs[*log];
             let first = self.machine.first_row(log, self.control)?;
             Ok(sentence(self.machine, log, jump, first))
@@ -48,7 +48,7 @@ impl Passes<'_> {
 }
 
 /// `first` is the time of the first row that is read, as the rows have it [s].
-fn sentence(machine: &LoggedRobot, log: &Log, jump: &Jump, first: f64) -> String {
+fn sentence(machine: &LoggedRobot, log: &Log, jump: &ResidualJump, first: f64) -> String {
     let [from, to] = jump.span.map(|t| t - first);
     let names = machine.robot.joint_names();
     let joints: Vec<&str> = jump
@@ -83,10 +83,16 @@ pub(crate) fn hangs_on_bridged(
         return Ok(None);
     }
     let kept = machine.keeping(RowFault::Spike);
-    let mut passes =
-        Passes::new(&kept, logs, control).each_by_itself(kept.own_settings(logs, &[], control)?);
+    let mut passes = LogPasses::new(&kept, logs, control).each_by_itself(kept.own_settings(
+        logs,
+        &[],
+        control,
+    )?);
     let as_logged = passes.read(PositionFilter::Declared, linear, None)?;
-    let (Ok(now), Ok(other)) = (fit(rows, Weighting::Wls), fit(&as_logged, Weighting::Wls)) else {
+    let (Ok(now), Ok(other)) = (
+        fit(rows, RowWeighting::Wls),
+        fit(&as_logged, RowWeighting::Wls),
+    ) else {
         return Ok(None);
     };
     let moved = unknowns.iter().enumerate().filter_map(|(i, unknown)| {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::consistent::ConsistentLinks;
-use super::estimate::Account;
+use super::estimate::EstimatorAccount;
 use super::gains::{Gain, LSQ_WITH_GAINS};
 use super::known_friction::FrictionOfFit;
 use super::motion_fit::MotionFit;
@@ -63,7 +63,7 @@ pub struct IdentifiedDynamics {
     /// By which filter positions became velocities; joints that never move are left out.
     pub position_cutoffs: Vec<PositionCutoff>,
     #[serde(rename = "estimator")]
-    pub account: Account,
+    pub account: EstimatorAccount,
     #[serde(rename = "processing")]
     pub summary: Summary,
     /// What the check of the set-up found, where it was made.

@@ -7,32 +7,33 @@ use serde::Serialize;
 use super::known_friction::{of_joint, of_refinement, with_friction};
 use crate::input::error::IdentifyError;
 use crate::input::logged_robot::LoggedRobot;
-use crate::input::passes::{Passes, PositionFilter, SimulatedLoop};
+use crate::input::passes::{LogPasses, PositionFilter, SimulatedLoop};
 use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
 use cft_ident_core::inertia::add_processing;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::departure;
 use cft_ident_core::inertia::encoder::{add_scatter, bias};
 use cft_ident_core::inertia::feasible::nearest;
-use cft_ident_core::inertia::instruments::{self, Instrumental};
+use cft_ident_core::inertia::instruments::{self, InstrumentalFit};
 use cft_ident_core::inertia::late;
 use cft_ident_core::inertia::law_start;
 use cft_ident_core::inertia::refine::{self, RefinedFit};
-use cft_ident_core::inertia::robust::{self, Robust, Weigher};
+use cft_ident_core::inertia::robust::{self, RobustFit, RowWeigher};
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::inertia::solve::{self, Fit, fit};
 use cft_ident_core::inertia::standstill;
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_files::config::campaign::EstimatorKind;
 
 /// What an estimator says of its own work.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Account {
+#[schemars(rename = "Account")]
+pub struct EstimatorAccount {
     #[serde(rename = "name")]
     pub estimator: EstimatorKind,
     /// The estimator that was asked for cannot do without the refinement of the friction law.
     pub law_refined: bool,
-    pub status: Ending,
+    pub status: IterationEnding,
     /// Passes over the logs; 1 for least squares.
     pub iterations: usize,
     /// Joint by joint; nothing for least squares.
@@ -64,12 +65,12 @@ pub struct JointAccount {
     pub relative_error_before: Option<f64>,
 }
 
-impl Account {
+impl EstimatorAccount {
     fn of(estimator: EstimatorKind) -> Self {
-        Account {
+        EstimatorAccount {
             estimator,
             law_refined: false,
-            status: Ending::Converged,
+            status: IterationEnding::Converged,
             iterations: 1,
             joints: Vec::new(),
             simulated: None,
@@ -89,19 +90,19 @@ impl Account {
 }
 
 /// A fit, the columns that its unknowns belong to, and how it came about.
-pub struct Estimated {
+pub struct InertialEstimate {
     pub columns: RegressorColumns,
     pub fit: Fit,
     /// Covariance of the unknowns and of the known friction of each joint, in this order.
     pub covariance: DMatrix<f64>,
     /// What noise of the positions makes of the unknowns, where that is known.
     pub bias: Option<DVector<f64>>,
-    pub basis: Basis,
-    pub account: Account,
+    pub basis: FitRows,
+    pub account: EstimatorAccount,
 }
 
 /// The rows that the fit is about, reduced.
-pub struct Basis {
+pub struct FitRows {
     pub sums: BlockFactors,
     /// The same in parts that can be left out; none where the fit is not linear in its rows.
     pub parts: Vec<BlockFactor>,
@@ -109,10 +110,10 @@ pub struct Basis {
     pub shift: DVector<f64>,
 }
 
-impl Basis {
+impl FitRows {
     /// Rows that no law shifts, of so many unknowns.
     fn in_one_block(sums: &BlockFactors, unknowns: usize) -> Self {
-        Basis {
+        FitRows {
             sums: sums.in_one_block(),
             parts: Vec::new(),
             shift: DVector::zeros(unknowns),
@@ -122,8 +123,8 @@ impl Basis {
 
 /// What turns other readings of the logs into a fit of the same kind.
 enum Solver {
-    Linear(solve::Weighting),
-    Robust(Box<Weigher>),
+    Linear(solve::RowWeighting),
+    Robust(Box<RowWeigher>),
     Refined(Box<RefinedFit>),
     /// The fit, and the parameters that were simulated.
     Instrumental(Box<(Fit, DVector<f64>)>),
@@ -138,43 +139,43 @@ impl Solver {
         }
     }
 
-    fn weigher(&self) -> Option<Weigher> {
+    fn weigher(&self) -> Option<RowWeigher> {
         match self {
             Solver::Robust(weigher) => Some(weigher.afresh()),
             _ => None,
         }
     }
 
-    fn solve(&self, sums: BlockFactors, weigher: Option<&Weigher>) -> Result<Fit, FitError> {
+    fn solve(&self, sums: BlockFactors, weigher: Option<&RowWeigher>) -> Result<Fit, FitError> {
         match self {
             Solver::Refined(refined) => refined.solve(sums),
             Solver::Robust(own) => weigher.unwrap_or(own).solve(&sums),
             Solver::Linear(estimator) => fit(&sums, *estimator),
             // rows without instruments: what moves the plain fit moves this one
-            Solver::Instrumental(_) => fit(&sums, solve::Weighting::Wls),
+            Solver::Instrumental(_) => fit(&sums, solve::RowWeighting::Wls),
         }
     }
 }
 
 /// A fit before its uncertainty is widened, its rows, and what makes fits of the same kind of other readings.
-type Found = (Fit, Basis, Solver);
+type PlainEstimate = (Fit, FitRows, Solver);
 
 /// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
 /// (18), which is then refined.
 pub fn estimate(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     columns: RegressorColumns,
     estimator: EstimatorKind,
     law: bool,
-) -> Result<Estimated, IdentifyError> {
-    let mut account = Account::of(estimator);
+) -> Result<InertialEstimate, IdentifyError> {
+    let mut account = EstimatorAccount::of(estimator);
     let shown = &mut account;
     let moves = columns.known.iter().flatten().any(KnownFriction::moves);
     let mut columns = columns;
     if moves && estimator != EstimatorKind::Oe {
         let found = with_known_friction(passes, columns, shown)?;
         if estimator == EstimatorKind::Wls {
-            return Ok(Estimated { account, ..found });
+            return Ok(InertialEstimate { account, ..found });
         }
         // rows weighted otherwise inform the inertias alone; the friction stays as it was refined
         columns = found.columns;
@@ -190,8 +191,8 @@ pub fn estimate(
             first_reading(passes, &columns)?;
             instrumental(passes, &columns, shown)?
         }
-        EstimatorKind::Ols => linear(passes, &columns, solve::Weighting::Ols)?,
-        EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,
+        EstimatorKind::Ols => linear(passes, &columns, solve::RowWeighting::Ols)?,
+        EstimatorKind::Wls => linear(passes, &columns, solve::RowWeighting::Wls)?,
     };
     let bias = widen(passes, &columns, &solver, &mut fit)?;
     departure::widen_by_departure(&basis.sums, &mut fit);
@@ -202,7 +203,7 @@ pub fn estimate(
         }
         _ => columns,
     };
-    Ok(Estimated {
+    Ok(InertialEstimate {
         covariance: with_friction(&columns, &fit),
         columns,
         fit,
@@ -214,10 +215,10 @@ pub fn estimate(
 
 /// Refines the known friction with the inertias, drawn to it by its covariance; the fit left is of the inertias.
 fn with_known_friction(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     mut columns: RegressorColumns,
-    account: &mut Account,
-) -> Result<Estimated, IdentifyError> {
+    account: &mut EstimatorAccount,
+) -> Result<InertialEstimate, IdentifyError> {
     let refined = refinement(passes, columns.clone(), account)?;
     let (mut fit, sums) = refined.without_laws()?;
     let (laws, free) = (
@@ -242,47 +243,47 @@ fn with_known_friction(
             held: [true; GRADIENT],
         };
     }
-    Ok(Estimated {
+    Ok(InertialEstimate {
         columns,
         fit,
         covariance,
         bias: None,
-        basis: Basis::in_one_block(&sums, u),
+        basis: FitRows::in_one_block(&sums, u),
         account: account.clone(),
     })
 }
 
 /// Linear least squares, rows weighted or alike.
 fn linear(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     columns: &RegressorColumns,
-    estimator: solve::Weighting,
-) -> Result<Found, IdentifyError> {
+    estimator: solve::RowWeighting,
+) -> Result<PlainEstimate, IdentifyError> {
     let sums = first_reading(passes, columns)?;
     let found = fit(&sums, estimator)?;
-    let basis = Basis {
+    let basis = FitRows {
         parts: sums.in_parts(),
-        ..Basis::in_one_block(&sums, found.theta.len())
+        ..FitRows::in_one_block(&sums, found.theta.len())
     };
     Ok((found, basis, Solver::Linear(estimator)))
 }
 
 /// Rows as the robot file says, with samples at standstill where they count.
 fn first_reading(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     columns: &RegressorColumns,
 ) -> Result<BlockFactors, IdentifyError> {
     let sums = passes.read(PositionFilter::Declared, columns, None)?;
     if passes.plain {
         return Ok(sums);
     }
-    let without = fit(&sums, solve::Weighting::Wls)?;
+    let without = fit(&sums, solve::RowWeighting::Wls)?;
     let open = standstill::open_joints(columns, &without);
     if open.is_empty() || !passes.count_rests(&open) {
         return Ok(sums);
     }
     let all = passes.read(PositionFilter::Declared, columns, None)?;
-    let with = fit(&all, solve::Weighting::Wls)?;
+    let with = fit(&all, solve::RowWeighting::Wls)?;
     let counted = standstill::counted(columns, open.clone(), [&without, &with]);
     passes.count_rests(&counted);
     match counted.len() {
@@ -294,11 +295,11 @@ fn first_reading(
 
 /// The slopes of the friction law with all else.
 fn refined(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     columns: &RegressorColumns,
     law: bool,
-    account: &mut Account,
-) -> Result<Found, IdentifyError> {
+    account: &mut EstimatorAccount,
+) -> Result<PlainEstimate, IdentifyError> {
     let start = match law {
         true => law_start::begin(columns, &mut |columns| {
             passes.read(PositionFilter::Declared, columns, None)
@@ -306,7 +307,7 @@ fn refined(
         false => columns.clone(),
     };
     let refined = refinement(passes, start, account)?;
-    let basis = Basis::in_one_block(&refined.factors, refined.fit.theta.len());
+    let basis = FitRows::in_one_block(&refined.factors, refined.fit.theta.len());
     Ok((
         refined.fit.clone(),
         basis,
@@ -316,9 +317,9 @@ fn refined(
 
 /// The refinement from a law of every joint.
 fn refinement(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     start: RegressorColumns,
-    account: &mut Account,
+    account: &mut EstimatorAccount,
 ) -> Result<RefinedFit, IdentifyError> {
     passes.work.doing("friction law");
     let refined = refine::refine(start, &mut |columns| {
@@ -336,12 +337,12 @@ fn refinement(
 
 /// Rows with large residuals count less.
 fn robust_regression(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     columns: &RegressorColumns,
-    account: &mut Account,
-) -> Result<Found, IdentifyError> {
+    account: &mut EstimatorAccount,
+) -> Result<PlainEstimate, IdentifyError> {
     passes.work.doing("robust regression");
-    let Robust {
+    let RobustFit {
         fit,
         factors: sums,
         weigher,
@@ -357,24 +358,24 @@ fn robust_regression(
         down_weighted: Some(down_weighted[j]),
         ..JointAccount::default()
     });
-    let basis = Basis::in_one_block(&sums, fit.theta.len());
+    let basis = FitRows::in_one_block(&sums, fit.theta.len());
     Ok((fit, basis, Solver::Robust(Box::new(weigher))))
 }
 
 /// The regressor along simulated positions as instruments.
 fn instrumental(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     columns: &RegressorColumns,
-    account: &mut Account,
-) -> Result<Found, IdentifyError> {
+    account: &mut EstimatorAccount,
+) -> Result<PlainEstimate, IdentifyError> {
     passes.work.doing("instrumental variables");
     let sums = passes.read(PositionFilter::Declared, columns, None)?;
-    let plain = fit(&sums, solve::Weighting::Wls)?;
+    let plain = fit(&sums, solve::RowWeighting::Wls)?;
     let map = passes.machine.robot.standard_map();
     let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
     let effective = plain.effective_rows / plain.rows as f64;
     let mut simulate_by = plain.theta.clone();
-    let Instrumental {
+    let InstrumentalFit {
         fit,
         ending: status,
         iterations,
@@ -395,14 +396,14 @@ fn instrumental(
     account.status = status;
     account.iterations = iterations;
     let solver = Solver::Instrumental(Box::new((fit.clone(), simulate_by)));
-    let basis = Basis::in_one_block(&sums, fit.theta.len());
+    let basis = FitRows::in_one_block(&sums, fit.theta.len());
     Ok((fit, basis, solver))
 }
 
 /// Adds to the uncertainty of a fit what a narrower position filter and the encoders' grid move; and what noise of the
 /// positions makes of it, where that is known.
 fn widen(
-    passes: &mut Passes,
+    passes: &mut LogPasses,
     columns: &RegressorColumns,
     solver: &Solver,
     fit: &mut Fit,
@@ -429,7 +430,7 @@ fn widen(
     };
     add_processing(fit, &again);
     let grids = passes.machine.robot.transmission().encoder_steps();
-    let wls = matches!(solver, Solver::Linear(solve::Weighting::Wls));
+    let wls = matches!(solver, Solver::Linear(solve::RowWeighting::Wls));
     if grids.is_none() && !wls {
         return Ok(None);
     }

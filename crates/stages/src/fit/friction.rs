@@ -15,12 +15,12 @@ use crate::input::model::new_model;
 use crate::input::one_joint::{self, OneJointLog};
 use crate::input::repeated::each_row_once;
 use crate::setup::Finding;
-use cft_ident_core::friction::estimate::{JointEstimate, Nis, Options, estimate};
+use cft_ident_core::friction::estimate::{FrictionOptions, JointEstimate, NisStatistic, estimate};
 use cft_ident_core::friction::excitation::{FrictionError, moving_joint};
-use cft_ident_core::friction::inputs::Inputs;
+use cft_ident_core::friction::inputs::FrictionInputs;
 use cft_ident_core::friction::passes::GivenNoise;
 use cft_ident_core::friction::prepare::{SensorModel, SmoothedMotion, prepare, resolution};
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::number;
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_core::verdict::Verdict;
@@ -125,7 +125,7 @@ impl FrictionOfJoint {
             joint: machine.robot.joint_names()[index].clone(),
             index,
             logs,
-            converged: estimate.ending == Ending::Converged,
+            converged: estimate.ending == IterationEnding::Converged,
             parameters: LawParameters {
                 viscous: parameter(0),
                 coulomb_1: parameter(1),
@@ -177,14 +177,14 @@ pub fn friction(
 }
 
 /// Logs by the joint that they move, with their inputs and warnings.
-type Grouped = (BTreeMap<usize, Group>, Vec<Provenance>, Vec<String>);
+type LogsByJoint = (BTreeMap<usize, JointLogs>, Vec<Provenance>, Vec<String>);
 
 fn by_joint(
     machine: &LoggedRobot,
     logs: &[Log],
     settings: &FrictionSettings,
     control: &Control,
-) -> Result<Grouped, IdentifyError> {
+) -> Result<LogsByJoint, IdentifyError> {
     let names = machine.robot.joint_names();
     let place = |name: &String| {
         let found = names.iter().position(|n| n == name);
@@ -196,7 +196,7 @@ fn by_joint(
     let named = settings.joint.as_ref().map(place).transpose()?;
     let _work = control.begin("reading logs", None);
     let ranges = machine.ranges();
-    let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
+    let mut groups: BTreeMap<usize, JointLogs> = BTreeMap::new();
     let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
         let OneJointLog {
@@ -229,7 +229,7 @@ fn by_joint(
 
 /// Logs of one joint.
 #[derive(Default)]
-struct Group {
+struct JointLogs {
     motions: Vec<SmoothedMotion>,
     narrower: Vec<SmoothedMotion>,
     zero_order_hold: bool,
@@ -240,7 +240,7 @@ struct Group {
 fn one_joint(
     machine: &LoggedRobot,
     j: usize,
-    group: &Group,
+    group: &JointLogs,
     parameter_names: &[String],
 ) -> Result<JointEstimate, IdentifyError> {
     let name = &machine.robot.joint_names()[j];
@@ -268,15 +268,15 @@ fn one_joint(
             joint: name.clone(),
         })
     })?;
-    let options = Options {
+    let options = FrictionOptions {
         start: start_of(machine, name),
         noise: GivenNoise {
             torque: noise.and_then(|n| n.torque_std),
             position_factor: None,
         },
-        ..Options::default()
+        ..FrictionOptions::default()
     };
-    let inputs = Inputs {
+    let inputs = FrictionInputs {
         robot: &machine.robot,
         joint: j,
         motions: &group.motions,
@@ -302,11 +302,11 @@ fn start_of(machine: &LoggedRobot, joint: &str) -> Option<DoubleTanh> {
 fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
     let (joint, e) = (&found.joint, &found.estimate);
     let mut out = Vec::new();
-    if e.ending != Ending::Converged {
+    if e.ending != IterationEnding::Converged {
         out.push(format!(
             "{joint}: the search ended without converging ({}): none of its parameters is identified",
             match e.ending {
-                Ending::IterationLimit => "at the limit of iterations",
+                IterationEnding::IterationLimit => "at the limit of iterations",
                 _ => "it diverged",
             }
         ));
@@ -317,7 +317,7 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
             number::significant(speed, 2)
         ));
     }
-    let Nis {
+    let NisStatistic {
         mean,
         lower_95,
         upper_95,
@@ -353,7 +353,7 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
         ));
     }
     out.extend(missed_plateaus(found));
-    let settled = e.ending == Ending::Converged;
+    let settled = e.ending == IterationEnding::Converged;
     for (k, value) in e.values.iter().enumerate() {
         match value.verdict {
             Verdict::LowerBound => out.push(format!(

@@ -10,7 +10,7 @@ use crate::input::error::IdentifyError;
 use crate::input::gain_error::GainError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
-use crate::input::passes::{Passes, PositionFilter};
+use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::setup_file::differences;
 use crate::input::unknowns::columns;
 use crate::setup::{ChannelKind, Finding, FindingKind, Setting};
@@ -19,7 +19,7 @@ use cft_ident_core::inertia::gains::{self, GainFit, GainRows, PayloadColumns};
 use cft_ident_core::number;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 use cft_ident_files::config::RobotFile;
-use cft_ident_files::config::correction::Edit;
+use cft_ident_files::config::correction::KeyEdit;
 use cft_ident_logs::log::{Provenance, TorqueUnit};
 
 /// The command of a model whose gains were fitted by a known load.
@@ -69,7 +69,7 @@ pub struct FittedGains {
     /// The robot, its file with the gains as `torque_scale`.
     pub machine: LoggedRobot,
     /// What differs in its file.
-    pub edits: Vec<Edit>,
+    pub edits: Vec<KeyEdit>,
     /// Factors by which the channels were multiplied.
     factors: Vec<f64>,
 }
@@ -107,9 +107,9 @@ pub fn fit_gains(
     let loaded: Vec<Log> = payload.iter().map(|p| p.log.clone()).collect();
     let mut columns = columns(machine, None);
     columns.rest_at(machine.rest_speeds(&[logs, &loaded].concat(), control)?);
-    let mut reading = Reading {
-        unloaded: Passes::new(machine, logs, control),
-        loaded: Passes::new(machine, &loaded, control),
+    let mut reading = LoadReadings {
+        unloaded: LogPasses::new(machine, logs, control),
+        loaded: LogPasses::new(machine, &loaded, control),
         columns,
         payload: shape,
     };
@@ -154,14 +154,14 @@ pub fn fit_gains(
 }
 
 /// The two sets of logs, read once for each processing.
-struct Reading<'a> {
-    unloaded: Passes<'a>,
-    loaded: Passes<'a>,
+struct LoadReadings<'a> {
+    unloaded: LogPasses<'a>,
+    loaded: LogPasses<'a>,
     columns: RegressorColumns,
     payload: Option<PayloadColumns>,
 }
 
-impl Reading<'_> {
+impl LoadReadings<'_> {
     fn fit(&mut self, filter: PositionFilter) -> Result<GainFit, IdentifyError> {
         let unloaded = self.unloaded.read(filter, &self.columns, None)?;
         let loaded = match &self.payload {
@@ -353,10 +353,10 @@ fn with_gains(machine: &LoggedRobot, factors: &[f64], relative: bool) -> LoggedR
 }
 
 /// The lines of a robot file that its gains are.
-fn edits(new: &RobotFile, old: &RobotFile) -> Vec<Edit> {
+fn edits(new: &RobotFile, old: &RobotFile) -> Vec<KeyEdit> {
     let mut out = Vec::new();
     if new.log.relative_gains != old.log.relative_gains {
-        out.push(Edit::new(
+        out.push(KeyEdit::new(
             &["log", "relative_gains"],
             new.log.relative_gains,
         ));
@@ -396,7 +396,7 @@ fn warnings(fit: &GainFit, reference: Option<&str>, mut of_logs: Vec<String>) ->
             "gains are ratios to that of {reference}: the model is in the unit of its channel, and a known payload (`--fit-gains LOG:mass=KG`) would make it SI"
         ));
     }
-    if fit.ending != cft_ident_core::math::descent::Ending::Converged {
+    if fit.ending != cft_ident_core::math::descent::IterationEnding::Converged {
         of_logs.push(format!(
             "the gains did not settle in {} steps; their last values stand",
             fit.iterations

@@ -17,7 +17,7 @@ const MAX_CONDITION: f64 = 1e4;
 const ROUNDING: [f64; 2] = [0.02, 2e-3];
 
 /// A number of a link that is nearly a plain one.
-struct Nearly {
+struct NearRoundNumber {
     link: usize,
     key: &'static str,
     /// Place in a vector; 0 for a number alone.
@@ -26,7 +26,7 @@ struct Nearly {
     plain: f64,
 }
 
-impl Nearly {
+impl NearRoundNumber {
     fn of(link: usize, key: &'static str, part: usize, declared: f64) -> Option<Self> {
         let angle = matches!(key, "alpha" | "theta" | "rpy");
         let (plain, near) = match angle {
@@ -59,7 +59,7 @@ impl Nearly {
     }
 }
 
-fn all_nearly(links: &[LinkSection]) -> Vec<Nearly> {
+fn all_nearly(links: &[LinkSection]) -> Vec<NearRoundNumber> {
     let mut out = Vec::new();
     for (i, link) in links.iter().enumerate() {
         for (key, value) in [
@@ -68,18 +68,18 @@ fn all_nearly(links: &[LinkSection]) -> Vec<Nearly> {
             ("d", link.d),
             ("theta", link.theta),
         ] {
-            out.extend(value.and_then(|value| Nearly::of(i, key, 0, value)));
+            out.extend(value.and_then(|value| NearRoundNumber::of(i, key, 0, value)));
         }
         for (key, vector) in [("xyz", link.xyz), ("rpy", link.rpy)] {
             let parts = vector.into_iter().flatten().enumerate();
-            out.extend(parts.filter_map(|(part, value)| Nearly::of(i, key, part, value)));
+            out.extend(parts.filter_map(|(part, value)| NearRoundNumber::of(i, key, part, value)));
         }
     }
     out
 }
 
 /// Number of base parameters of a robot with these numbers made plain.
-fn parameters<'n>(file: &RobotFile, plain: impl Iterator<Item = &'n Nearly>) -> usize {
+fn parameters<'n>(file: &RobotFile, plain: impl Iterator<Item = &'n NearRoundNumber>) -> usize {
     let mut file = file.clone();
     plain.for_each(|nearly| nearly.put(&mut file.robot.link));
     file.robot().parameters().len()
@@ -124,7 +124,7 @@ pub(crate) fn geometry(
         )
     });
     let finding = |k: usize| {
-        let Nearly {
+        let NearRoundNumber {
             link,
             key,
             part,

@@ -4,7 +4,7 @@ use super::by_motion::by_motion;
 use super::consistent::{ConsistentLinks, consistent, or_plain_fit};
 use super::contact::hangs_on_bridged;
 use super::dynamics::{EssentialFit, IdentifiedDynamics};
-use super::estimate::{Basis, Estimated, estimate};
+use super::estimate::{FitRows, InertialEstimate, estimate};
 use super::gains::CurrentGains;
 use super::geometry::geometry;
 use super::known_friction::FrictionBefore;
@@ -21,14 +21,14 @@ use crate::input::gain_error::GainError;
 use crate::input::log::Log;
 use crate::input::model::refined;
 use crate::input::own_settings::CutoffCosts;
-use crate::input::passes::Passes;
+use crate::input::passes::LogPasses;
 use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::{MadeWith, ReducedLog};
 use crate::input::repeated::each_row_once;
 use crate::input::unknowns::{FittedUnknown, columns, unknowns};
 use cft_ident_core::inertia::accumulate::RelativeResidual;
 use cft_ident_core::inertia::encoder::correct;
-use cft_ident_core::inertia::essential::{Essential, essential};
+use cft_ident_core::inertia::essential::{EssentialParameters, essential};
 use cft_ident_core::inertia::gains::by_gains;
 use cft_ident_core::inertia::solution::FitError;
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
@@ -110,7 +110,7 @@ pub fn lsq(
         .collect();
     let own = machine.own_settings(logs, &laws, control)?;
     let costs: Vec<CutoffCosts> = own.iter().map(|own| own.costs.clone()).collect();
-    let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
+    let mut passes = LogPasses::new(machine, logs, control).each_by_itself(own);
     passes.plain = estimator == EstimatorKind::Ols;
     let mut estimated = estimate(&mut passes, linear.clone(), estimator, law)?;
     if let Some(gains) = settings.gains {
@@ -133,12 +133,12 @@ pub fn lsq(
         let fit = &mut estimated.fit;
         correct(&mut fit.theta, &mut fit.covariance, &bias, stay);
     }
-    let Estimated {
+    let InertialEstimate {
         columns,
         fit,
         mut covariance,
         account,
-        basis: Basis { sums, .. },
+        basis: FitRows { sums, .. },
         ..
     } = estimated;
     let u = fit.theta.len();
@@ -267,7 +267,10 @@ fn held_by_parts(settings: &LsqSettings, reduced: &[&ReducedLog]) -> Option<Stri
 }
 
 /// Adds to the covariance of a fit that of the gains by which its torques were made.
-fn share_uncertainty(estimated: &mut Estimated, gains: &CurrentGains) -> Result<(), FitError> {
+fn share_uncertainty(
+    estimated: &mut InertialEstimate,
+    gains: &CurrentGains,
+) -> Result<(), FitError> {
     let (fit, basis) = (&mut estimated.fit, &estimated.basis);
     let std = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
     let weights = weights_of(&basis.sums, &std);
@@ -279,7 +282,9 @@ fn share_uncertainty(estimated: &mut Estimated, gains: &CurrentGains) -> Result<
 /// Share that a fit leaves of every joint where noise is as large as the torque: noise leaves 0.7 of their sum.
 const NOISE_ONLY_SHARE: f64 = 0.7;
 /// The essential unknowns, and the relative residual of each joint with those alone.
-fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyError> {
+fn essentials(
+    estimated: &InertialEstimate,
+) -> Result<(EssentialParameters, Vec<f64>), IdentifyError> {
     let (fit, basis) = (&estimated.fit, &estimated.basis);
     let weights = weights_of(
         &basis.sums,

@@ -1,12 +1,12 @@
 //! What a fit warns of.
 
-use super::estimate::Account;
+use super::estimate::EstimatorAccount;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::unknowns::FittedUnknown;
 use cft_ident_core::inertia::instruments::ReferenceSource;
-use cft_ident_core::inertia::solution::Confounded;
+use cft_ident_core::inertia::solution::ConfoundedUnknowns;
 use cft_ident_core::inertia::solve::Fit;
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::number;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::model_file::is_positive;
@@ -22,7 +22,7 @@ pub(crate) fn with_friction(law: bool) -> &'static str {
     }
 }
 
-impl Account {
+impl EstimatorAccount {
     /// What did not come as it should, as warnings.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
@@ -40,7 +40,7 @@ impl Account {
                 ));
             }
         }
-        if self.status == Ending::IterationLimit {
+        if self.status == IterationEnding::IterationLimit {
             out.push(format!(
                 "{} did not settle in {} passes over the logs; its last result stands",
                 self.estimator.name(),
@@ -102,9 +102,9 @@ pub(crate) fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<String> {
         }
         _ => unknowns[i].key.clone(),
     };
-    let (silent, mixed): (Vec<&Confounded>, Vec<&Confounded>) =
+    let (silent, mixed): (Vec<&ConfoundedUnknowns>, Vec<&ConfoundedUnknowns>) =
         fit.confounded.iter().partition(|c| c.terms.len() == 1);
-    let sentence = |c: &&Confounded| {
+    let sentence = |c: &&ConfoundedUnknowns| {
         let most = || c.terms.iter().take(6);
         let names: Vec<String> = most().map(|(i, _)| name(*i)).collect();
         let words: Vec<String> = most()

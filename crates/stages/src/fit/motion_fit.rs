@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::open_loop::{PositionErrors, TriedAxis};
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_files::config::model_file::EffectSection;
 
 /// What a fit to the motion of an axis came to.
@@ -28,7 +28,7 @@ pub struct MotionFit {
     pub after: PositionErrors,
     /// It is in the model: on blocks set aside it runs better than least squares.
     pub taken: bool,
-    pub status: Ending,
+    pub status: IterationEnding,
     pub steps: u64,
     /// Friction that was added.
     pub effects: Vec<EffectSection>,

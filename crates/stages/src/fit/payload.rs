@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::gains::LSQ_WITH_GAINS;
 use super::payload_result::{
-    GainOff, LeftOfJoint, Number95, Payload, PayloadReading, PayloadVerdict,
+    GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
 };
 use crate::band::NORMAL_95;
 use crate::input::control::Control;
@@ -392,10 +392,10 @@ fn inverse(normal: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), IdentifyE
     ))
 }
 
-fn interval(value: f64, variance: f64, open: bool, unit: &str) -> Number95 {
+fn interval(value: f64, variance: f64, open: bool, unit: &str) -> IntervalNumber {
     let std = variance.max(0.0).sqrt();
     let known = !open && std.is_finite();
-    Number95 {
+    IntervalNumber {
         value: known.then_some(value),
         std: known.then_some(std),
         interval_95: known.then_some([value - NORMAL_95 * std, value + NORMAL_95 * std]),

@@ -31,7 +31,8 @@ pub enum PayloadVerdict {
 
 /// A number with its 95 % confidence interval; null where the log does not determine it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Number95 {
+#[schemars(rename = "Number95")]
+pub struct IntervalNumber {
     pub value: Option<f64>,
     pub std: Option<f64>,
     pub interval_95: Option<[f64; 2]>,
@@ -42,7 +43,7 @@ pub struct Number95 {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct GainOff {
     pub joint: String,
-    pub error: Number95,
+    pub error: IntervalNumber,
 }
 
 /// The torque error of a joint.
@@ -62,11 +63,11 @@ pub struct LeftOfJoint {
 pub struct PayloadReading {
     /// Whether gain errors were free.
     pub gains_free: bool,
-    pub mass: Number95,
+    pub mass: IntervalNumber,
     /// Centre of gravity in the frame of the link \[m\].
-    pub centre: [Number95; 3],
+    pub centre: [IntervalNumber; 3],
     /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity \[kg m^2\].
-    pub inertia: [Number95; 6],
+    pub inertia: [IntervalNumber; 6],
     pub gains: Vec<GainOff>,
     pub joints: Vec<LeftOfJoint>,
     /// Standard parameters of the body.
@@ -89,7 +90,7 @@ pub struct Payload {
     pub warnings: Vec<String>,
 }
 
-impl Number95 {
+impl IntervalNumber {
     /// Whether the interval lies above zero; false where there is none.
     fn is_above_zero(&self) -> bool {
         self.interval_95.is_some_and(|[low, _]| low > 0.0)

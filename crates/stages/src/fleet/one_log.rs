@@ -8,7 +8,7 @@ use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
-use crate::input::passes::Passes;
+use crate::input::passes::LogPasses;
 use crate::input::reduced::reduced_log::ReducedLog;
 use crate::input::unknowns::columns;
 use cft_ident_core::inertia::solve::Fit;
@@ -91,7 +91,7 @@ impl Source {
         let log = Log::Reduced(part.clone());
         let known = part.known_friction();
         let linear = columns(&machine, known.as_deref());
-        let mut passes = Passes::new(&machine, from_ref(&log), control);
+        let mut passes = LogPasses::new(&machine, from_ref(&log), control);
         let found = match estimate(&mut passes, linear.clone(), EstimatorKind::Wls, false) {
             Ok(found) => Some(found.fit),
             // a log that says nothing is a log that says nothing

@@ -8,7 +8,7 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
-use crate::input::passes::{Passes, PositionFilter};
+use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::reduced::{MadeWith, ReducedLog, ReducedLogs, ReducedRows};
 use crate::input::repeated::each_row_once;
 use crate::input::unknowns::columns;
@@ -69,7 +69,7 @@ pub fn reduce(
         let one = std::slice::from_ref(log);
         let own = machine.own_settings(one, &laws, control)?;
         let fastest = machine.fastest(one, control)?;
-        let mut passes = Passes::new(machine, one, control).each_by_itself(own.clone());
+        let mut passes = LogPasses::new(machine, one, control).each_by_itself(own.clone());
         let declared = passes.read_condensed(&linear)?;
         let narrower = passes.read(PositionFilter::Narrower, &linear.with_torque_rates(), None)?;
         let mut shifted = Vec::new();

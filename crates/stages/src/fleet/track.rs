@@ -13,7 +13,8 @@ use crate::input::error::IdentifyError;
 use crate::input::reduced::reduced_log::MadeWith;
 use crate::input::track_error::TrackError;
 use cft_ident_fleet::track::{
-    ChangeKind, Course, Level, LogEstimate, ParameterChange, apart, follow_together,
+    ChangeKind, LogEstimate, ParameterChange, ParameterCourse, ParameterLevel, apart,
+    follow_together,
 };
 use cft_ident_logs::log::Provenance;
 
@@ -369,8 +370,8 @@ const MIN_SHOWN_DEVIATIONS: f64 = 2.0;
 /// Changes of one parameter of those that are followed together.
 fn changed(
     key: &OneEstimate,
-    course: &Course,
-    together: &[Course],
+    course: &ParameterCourse,
+    together: &[ParameterCourse],
     times: &[f64],
 ) -> Vec<TrackedChange> {
     let clear = |c: &ParameterChange| (c.size / c.std).abs();
@@ -400,7 +401,7 @@ fn changed(
 /// One parameter over time.
 fn tracked(
     key: &OneEstimate,
-    course: &Course,
+    course: &ParameterCourse,
     estimates: &[LogEstimate],
     times: &[f64],
 ) -> TrackedParameter {
@@ -442,7 +443,7 @@ fn compared(robots: &[TrackedRobot]) -> Vec<FleetDifference> {
             let own = tracked.parameters.iter().find(same);
             let last = own.and_then(|p| Some(((*p.values.last()?)?, (*p.std.last()?)?)));
             if let Some((value, std)) = last {
-                levels.push(Level {
+                levels.push(ParameterLevel {
                     robot,
                     parameter,
                     value,

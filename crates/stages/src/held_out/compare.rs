@@ -19,7 +19,9 @@ use cft_ident_core::friction::estimate::FrictionCurvePoint;
 use cft_ident_core::motion::ParallelFilters;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::robot::model::JointFriction;
-use cft_ident_core::validate::{JointError, Overall, Reconstruction, Validation};
+use cft_ident_core::validate::{
+    JointError, OverallTorqueErrors, TorqueReconstruction, TorqueValidation,
+};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
 
@@ -27,7 +29,7 @@ use cft_ident_logs::log::{Provenance, escape};
 pub const DIFFERENT: f64 = 1.96;
 
 /// A model file with what it stands for.
-pub struct Side {
+pub struct ComparedFile {
     pub given: GivenModel,
     pub model: AugmentedModel,
 }
@@ -35,23 +37,23 @@ pub struct Side {
 /// Both models on the same logs.
 pub struct TriedOnLogs {
     pub in_memory: InMemory,
-    pub validations: [Validation; 2],
+    pub validations: [TorqueValidation; 2],
     pub differences: ErrorDifferences,
 }
 
 /// Result of the comparison.
 pub struct Compared {
     pub machine: LoggedRobot,
-    pub sides: [Side; 2],
+    pub sides: [ComparedFile; 2],
     pub table: SideBySide,
-    pub curves: Vec<Curves>,
+    pub curves: Vec<FrictionCurves>,
     /// None where no log is given.
     pub tried: Option<TriedOnLogs>,
     pub warnings: Vec<String>,
 }
 
 /// Friction of one joint by both models.
-pub struct Curves {
+pub struct FrictionCurves {
     pub joint: String,
     pub speed_unit: String,
     pub torque_unit: String,
@@ -115,7 +117,7 @@ pub struct BothAt {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ComparedOnLogs {
     pub joints: Vec<ComparedErrors<JointError>>,
-    pub overall: ComparedErrors<Overall>,
+    pub overall: ComparedErrors<OverallTorqueErrors>,
     pub processing: Summary,
 }
 
@@ -161,17 +163,17 @@ impl TriedOnLogs {
 }
 
 /// A model; without logs one of friction alone will do.
-fn side(given: GivenModel, logs: bool) -> Result<Side, IdentifyError> {
+fn side(given: GivenModel, logs: bool) -> Result<ComparedFile, IdentifyError> {
     let model = match logs {
         true => given.numbers()?,
         false => refined_or_friction(&given.file, &given.name)?,
     };
-    Ok(Side { given, model })
+    Ok(ComparedFile { given, model })
 }
 
 /// Refuses two models whose parameters and torques are not of one robot.
-fn one_robot([a, b]: [&Side; 2]) -> Result<(), IdentifyError> {
-    let describe = |side: &Side| {
+fn one_robot([a, b]: [&ComparedFile; 2]) -> Result<(), IdentifyError> {
+    let describe = |side: &ComparedFile| {
         let (robot, file) = (&side.model.model.robot, &side.given.file.robot);
         let joints = robot.joint_names().iter().enumerate();
         let words = joints.map(|(j, name)| {
@@ -193,7 +195,7 @@ fn one_robot([a, b]: [&Side; 2]) -> Result<(), IdentifyError> {
 }
 
 /// What a reader has to know before believing a difference.
-fn cautions([a, b]: [&Side; 2], logs: bool) -> Vec<String> {
+fn cautions([a, b]: [&ComparedFile; 2], logs: bool) -> Vec<String> {
     let mut out = Vec::new();
     let (first, second) = (&a.given.file, &b.given.file);
     let made = |file: &ModelFile| file.provenance.inputs.clone();
@@ -258,7 +260,7 @@ pub fn compare(
 
 fn on_logs(
     machine: &LoggedRobot,
-    sides: &[Side; 2],
+    sides: &[ComparedFile; 2],
     logs: &[Log],
     control: &Control,
 ) -> Result<TriedOnLogs, IdentifyError> {
@@ -271,8 +273,8 @@ fn on_logs(
     }
     let settings = machine.settings();
     let named = |error| IdentifyError::motion(&machine.name, error);
-    let validation = |side: &Side| {
-        let mut all = Reconstruction::new(&side.model.model, &in_memory.rest_speed, None);
+    let validation = |side: &ComparedFile| {
+        let mut all = TorqueReconstruction::new(&side.model.model, &in_memory.rest_speed, None);
         for (segment, stretch) in in_memory.stretches.iter().enumerate() {
             let hat = side.model.reconstruct(stretch);
             all.add_stretch(&settings, segment, stretch, &hat, &mut |_| {})
@@ -296,7 +298,11 @@ fn on_logs(
 }
 
 /// Friction of the joints where a model has some.
-fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&TriedOnLogs>) -> Vec<Curves> {
+fn curves(
+    machine: &LoggedRobot,
+    sides: &[ComparedFile; 2],
+    tried: Option<&TriedOnLogs>,
+) -> Vec<FrictionCurves> {
     let robot = &machine.robot;
     let joints = robot.joint_names().iter().enumerate();
     joints
@@ -311,13 +317,13 @@ fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&TriedOnLogs>)
                 let most = all.flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
                 (most > 0.0).then_some(most)
             });
-            let limit = |side: &Side| side.given.file.robot.limits.get(joint)?.speed;
+            let limit = |side: &ComparedFile| side.given.file.robot.limits.get(joint)?.speed;
             let limit = || sides.iter().find_map(limit);
             let (most, speeds_from) = match seen {
                 Some(most) => (most, "logs"),
                 None => limit().map_or((1.0, "assumed"), |most| (most, "limits")),
             };
-            Some(Curves {
+            Some(FrictionCurves {
                 joint: joint.clone(),
                 speed_unit: format!("{}/s", robot.joint_kind(j).position_unit()),
                 torque_unit: machine.file.torque_unit(j).to_owned(),
@@ -332,7 +338,7 @@ fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&TriedOnLogs>)
 impl Compared {
     /// The comparison as a document holds it.
     pub fn result(&self) -> ComparisonResult {
-        let model = |side: &Side| {
+        let model = |side: &ComparedFile| {
             let from = &side.given.file.provenance;
             ComparedModel {
                 name: side.given.file_name.clone(),
@@ -349,7 +355,7 @@ impl Compared {
         }
     }
 
-    fn friction(&self, curves: &Curves) -> ComparedFriction {
+    fn friction(&self, curves: &FrictionCurves) -> ComparedFriction {
         // 50 equal steps in each direction
         let steps = (-50..=50).filter(|k| *k != 0);
         let [a, b] = self.at(curves, steps.map(|k| f64::from(k) / 50.0 * curves.most));
@@ -375,7 +381,7 @@ impl Compared {
     /// Both curves of a joint at these speeds; an empty one where a model has no friction there.
     pub fn at(
         &self,
-        curves: &Curves,
+        curves: &FrictionCurves,
         speeds: impl Iterator<Item = f64> + Clone,
     ) -> [Vec<FrictionCurvePoint>; 2] {
         let of = |k: usize| match &curves.laws[k] {

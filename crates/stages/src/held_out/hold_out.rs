@@ -7,12 +7,12 @@ use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
-use crate::observe::{KEPT, Observer, Quiet, QuietSample};
+use crate::observe::{KEPT, Observer, QuietSample, QuietTorques};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{FilterSettings, MotionError, ParallelFilters, Stretch, stretches};
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::ModelFile;
-use cft_ident_files::config::held_out::{Excesses, HeldOut};
+use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 use cft_ident_logs::log::{Block, Provenance};
 
 /// Blocks that are set aside one after the other.
@@ -32,7 +32,7 @@ const LEAD_PERIODS: f64 = 12.0;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Held {
     pub joints: Vec<HeldOut>,
-    pub excesses: Option<Excesses>,
+    pub excesses: Option<TorqueExcesses>,
 }
 
 impl Held {
@@ -275,7 +275,7 @@ impl<'a> Trial<'a> {
         folds: &Folds,
         models: &[AugmentedModel],
         held: &mut [HeldOut],
-    ) -> Result<Option<Excesses>, IdentifyError> {
+    ) -> Result<Option<TorqueExcesses>, IdentifyError> {
         let cutoff = self.settings.cutoff_hz;
         // what knows the past alone gains nothing by a wide filter, and accelerations take its noise
         let plain = self.settings.plain_q_cutoff_hz(f64::INFINITY);
@@ -283,7 +283,7 @@ impl<'a> Trial<'a> {
         let position = each.copied().fold(plain, f64::min);
         let settings = self.settings.with_one_position_filter(position);
         let uncertain = Directions::of(self.file, &self.model.model, held);
-        let mut quiet = Quiet::default();
+        let mut quiet = QuietTorques::default();
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
             let mut open = self.machine.open(log, self.control)?;

@@ -56,7 +56,7 @@ pub fn torque(
     let model = &refined.model;
     let n = machine.robot.joints();
     let band = Band::new(file, model);
-    let deviation = Deviations::new(machine, file, model);
+    let deviation = TorqueDeviations::new(machine, file, model);
     // torque, deviation, and half the band's width
     let kinds = if band.is_some() { 3 } else { 2 };
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
@@ -155,17 +155,17 @@ pub fn torque(
 }
 
 /// Standard deviations of a model's torque: of its parameters and of what the fit left.
-struct Deviations<'a> {
+struct TorqueDeviations<'a> {
     of_parameters: Deviation<'a>,
     /// What the fit left, per joint \[N or Nm\].
     residual: Vec<f64>,
 }
 
-impl<'a> Deviations<'a> {
+impl<'a> TorqueDeviations<'a> {
     fn new(machine: &LoggedRobot, file: &ModelFile, model: &'a Model) -> Self {
         let joints = machine.robot.joint_names().iter();
         let residual = joints.map(|j| file.residual_std.get(j).copied().unwrap_or(0.0));
-        Deviations {
+        TorqueDeviations {
             of_parameters: Deviation::new(&file.model_covariance(model), model),
             residual: residual.collect(),
         }

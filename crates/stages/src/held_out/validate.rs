@@ -12,7 +12,7 @@ use crate::input::in_memory::read_whole;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::refined;
-use crate::input::of_robot::{Beyond, Places};
+use crate::input::of_robot::{JointRanges, TorquePeaks};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::ReducedLog;
@@ -20,11 +20,12 @@ use crate::input::repeated::repeated_rows;
 use crate::input::unknowns::columns;
 use crate::open_loop::{FreeRun, OpenLoop};
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::inertia::columns::Own;
+use cft_ident_core::inertia::columns::JointTerm;
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::validate::{
-    HalfWidths, JointError, Reconstructed, Reconstruction, SummedRows, TorqueErrors, Validation,
+    HalfWidths, JointError, ReconstructedRow, SummedRows, TorqueErrors, TorqueReconstruction,
+    TorqueValidation,
 };
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{DataRole, Instant, Provenance};
@@ -33,7 +34,7 @@ use cft_ident_logs::log::{DataRole, Instant, Provenance};
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Validated {
     #[serde(flatten)]
-    pub validation: Validation,
+    pub validation: TorqueValidation,
     /// The same errors apart, where the model was made from some of the logs and not from others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub by_use: Option<ErrorsByUse>,
@@ -127,7 +128,7 @@ pub fn validate(
     data: &Dataset,
     settings: &ValidateSettings,
     control: &Control,
-    row: &mut dyn FnMut(&Reconstructed, Instant),
+    row: &mut dyn FnMut(&ReconstructedRow, Instant),
 ) -> Result<Validated, IdentifyError> {
     let logs = data.logs.as_slice();
     let refined = &settings.model.numbers()?;
@@ -176,7 +177,7 @@ fn errors_of(
     data: &Dataset,
     (refined, file): (&AugmentedModel, &ModelFile),
     control: &Control,
-    row: &mut dyn FnMut(&Reconstructed, Instant),
+    row: &mut dyn FnMut(&ReconstructedRow, Instant),
 ) -> Result<Validated, IdentifyError> {
     let (machine, logs) = (&data.machine, data.logs.as_slice());
     let whole = not_reduced(logs);
@@ -191,9 +192,9 @@ fn errors_of(
     let band = Band::new(file, &refined.model).filter(|_| rows);
     let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
-    let mut places = Places::new(&machine);
-    let mut beyond = Beyond::new(machine.robot.joints());
-    let mut seen = |r: &Reconstructed, origin: Instant| {
+    let mut places = JointRanges::new(&machine);
+    let mut beyond = TorquePeaks::new(machine.robot.joints());
+    let mut seen = |r: &ReconstructedRow, origin: Instant| {
         places.take(r.q);
         beyond.take(r, origin);
         if let Some(reach) = &mut reach {
@@ -288,7 +289,7 @@ fn reconstruct(
     band: Option<&Band>,
     logs: &[Log],
     control: &Control,
-    row: &mut dyn FnMut(&Reconstructed, Instant),
+    row: &mut dyn FnMut(&ReconstructedRow, Instant),
 ) -> Result<Validated, IdentifyError> {
     let work = control.begin("reconstruction", Some(logs.len() as u64));
     let widths = band.map(|band| {
@@ -296,7 +297,7 @@ fn reconstruct(
     });
     let widths: Option<HalfWidths> = widths.as_ref().map(|widths| widths as HalfWidths);
     let speeds = machine.rest_speeds(&not_reduced(logs), control)?;
-    let mut all = Reconstruction::new(&refined.model, &speeds, widths);
+    let mut all = TorqueReconstruction::new(&refined.model, &speeds, widths);
     let (mut inputs, mut last) = (Vec::new(), None);
     let mut warnings = repeated_rows(logs, Some(&machine.file.layout()));
     let settings = machine.settings();
@@ -331,7 +332,7 @@ fn reconstruct(
             all.count_from(whole.origin.seconds());
             for stretch in &whole.stretches {
                 let hat = refined.reconstruct(stretch);
-                let mut described = |r: &Reconstructed| row(r, whole.origin);
+                let mut described = |r: &ReconstructedRow| row(r, whole.origin);
                 all.add_stretch(&settings, segments, stretch, &hat, &mut described)
                     .map_err(|e| IdentifyError::motion(&log.name(), e))?;
                 segments += 1;
@@ -376,7 +377,7 @@ fn reconstruct(
 
 /// Adds the errors of a model that is linear in the columns of a reduced log.
 fn add_reduced(
-    all: &mut Reconstruction,
+    all: &mut TorqueReconstruction,
     machine: &LoggedRobot,
     refined: &AugmentedModel,
     part: &ReducedLog,
@@ -415,10 +416,13 @@ fn add_reduced(
             _ => [0.0, 0.0],
         };
         theta.extend(own.iter().map(|own| match own {
-            Own::Viscous => viscous_coulomb[0],
-            Own::Coulomb => viscous_coulomb[1],
-            Own::Offset => model.offset[j],
-            Own::Saturating(_) | Own::Law(_) | Own::TorqueRate | Own::TorqueBend => 0.0,
+            JointTerm::Viscous => viscous_coulomb[0],
+            JointTerm::Coulomb => viscous_coulomb[1],
+            JointTerm::Offset => model.offset[j],
+            JointTerm::Saturating(_)
+            | JointTerm::Law(_)
+            | JointTerm::TorqueRate
+            | JointTerm::TorqueBend => 0.0,
         }));
     }
     let rows = part.rows(columns)?;

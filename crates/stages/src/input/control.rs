@@ -20,15 +20,17 @@ pub enum Progress<'a> {
     Note(&'a str),
 }
 
-type Stop = dyn Fn() -> bool + Send + Sync;
-type Listener = dyn Fn(Progress) + Send + Sync;
+/// Says whether work is to end.
+type StopCheck = dyn Fn() -> bool + Send + Sync;
+/// Is told of the progress of work.
+type ProgressListener = dyn Fn(Progress) + Send + Sync;
 
 /// Cancellation and progress as callbacks, called from any thread; by default nothing stops a stage
 /// and nobody is informed.
 #[derive(Clone, Default)]
 pub struct Control {
-    stop: Option<Arc<Stop>>,
-    listener: Option<Arc<Listener>>,
+    stop: Option<Arc<StopCheck>>,
+    listener: Option<Arc<ProgressListener>>,
 }
 
 impl Control {
@@ -66,9 +68,9 @@ impl Control {
     }
 
     /// Begins work; it ends when the guard is dropped.
-    pub(crate) fn begin(&self, work: &str, steps: Option<u64>) -> Work {
+    pub(crate) fn begin(&self, work: &str, steps: Option<u64>) -> ControlledWork {
         self.report(Progress::Begin(work, steps));
-        Work {
+        ControlledWork {
             control: self.clone(),
         }
     }
@@ -90,11 +92,11 @@ impl fmt::Debug for Control {
 }
 
 /// Work that is under way.
-pub(crate) struct Work {
+pub(crate) struct ControlledWork {
     control: Control,
 }
 
-impl Work {
+impl ControlledWork {
     pub(crate) fn advance(&self, steps: u64) {
         self.control.report(Progress::Advance(steps));
     }
@@ -104,7 +106,7 @@ impl Work {
     }
 }
 
-impl Drop for Work {
+impl Drop for ControlledWork {
     fn drop(&mut self) {
         self.control.report(Progress::End);
     }

@@ -1,12 +1,12 @@
 //! What is known of a log before it is used.
 
-use cft_ident_logs::inspect::Gate;
+use cft_ident_logs::inspect::InspectionGate;
 
 /// What the first look at a log found.
 #[derive(Debug, Clone)]
 pub(crate) struct FirstLook {
     /// Faults, and rows to leave out.
-    pub(crate) gate: Gate,
+    pub(crate) gate: InspectionGate,
     /// Speed up to which each joint rests [m/s or rad/s].
     pub(crate) rest_speed: Vec<f64>,
     /// Greatest speed of each joint [m/s or rad/s].

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::error::IdentifyError;
 use super::open_log::OpenLog;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::math::rank;
 use cft_ident_core::math::rfactor::RFactor;
 use cft_ident_core::motion::{self, FilterSettings};
@@ -44,7 +44,7 @@ pub(crate) fn moves_freely(
     let columns = RegressorColumns {
         joints: n,
         shared: robot.parameters().len(),
-        own: vec![vec![Own::Viscous, Own::Coulomb, Own::Offset]; n],
+        own: vec![vec![JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset]; n],
         known: vec![None; n],
         rest_speed: Vec::new(),
     };

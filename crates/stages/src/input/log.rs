@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::reduced::reduced_log::ReducedLog;
-use cft_ident_logs::log::{Arrays, Layout, LogError, LogSpec, Reader, escape};
+use cft_ident_logs::log::{Layout, LogArrays, LogError, LogSpec, Reader, escape};
 
 /// A log.
 #[derive(Debug, Clone)]
@@ -13,7 +13,7 @@ pub enum Log {
     /// A file or a part of it, its channels mapped as the robot file says.
     File(LogSpec),
     /// Arrays of joint positions and torques, in SI units.
-    Arrays(Arc<Arrays>),
+    Arrays(Arc<LogArrays>),
     /// What a linear fit needs of a log: `lsq` and `validate` take it.
     Reduced(Arc<ReducedLog>),
 }
@@ -26,7 +26,7 @@ impl Log {
     /// # Errors
     /// Arrays whose sizes do not belong together.
     pub fn of_rows(name: &str, t: &[f64], q: &[f64], tau: &[f64]) -> Result<Self, LogError> {
-        let arrays = Arrays::new(name, t.to_vec(), q.to_vec(), tau.to_vec())?;
+        let arrays = LogArrays::new(name, t.to_vec(), q.to_vec(), tau.to_vec())?;
         Ok(Self::Arrays(Arc::new(arrays)))
     }
 
@@ -42,7 +42,7 @@ impl Log {
     ) -> Result<Self, LogError> {
         // nalgebra keeps columns together, a block rows
         let rows = |x: &DMatrix<f64>| x.transpose().as_slice().to_vec();
-        let arrays = Arrays::new(name, t.to_vec(), rows(q), rows(tau))?;
+        let arrays = LogArrays::new(name, t.to_vec(), rows(q), rows(tau))?;
         Ok(Self::Arrays(Arc::new(arrays)))
     }
 
@@ -55,7 +55,7 @@ impl Log {
         match self {
             Self::File(_) | Self::Reduced(_) => Ok(self),
             Self::Arrays(arrays) => Ok(Self::Arrays(Arc::new(
-                Arrays::clone(&arrays).with_references(references.to_vec())?,
+                LogArrays::clone(&arrays).with_references(references.to_vec())?,
             ))),
         }
     }
@@ -69,7 +69,7 @@ impl Log {
         match self {
             Self::File(_) | Self::Reduced(_) => Ok(self),
             Self::Arrays(arrays) => Ok(Self::Arrays(Arc::new(
-                Arrays::clone(&arrays).with_temperature(joint, temperatures.to_vec())?,
+                LogArrays::clone(&arrays).with_temperature(joint, temperatures.to_vec())?,
             ))),
         }
     }

@@ -16,13 +16,13 @@ use super::reference::LoggedReference;
 use super::speeds::SpeedMeter;
 use cft_ident_core::friction::estimate::NARROWER;
 use cft_ident_core::motion::{
-    Differences, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold,
+    DifferenceFormula, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold,
 };
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_core::validate::TorqueErrors;
 use cft_ident_files::config::robot_file::{DifferencesKind, FilterKind};
 use cft_ident_files::config::{ModelFile, RobotFile};
-use cft_ident_logs::inspect::{Gate, LogFault};
+use cft_ident_logs::inspect::{InspectionGate, LogFault};
 use cft_ident_logs::log::{Block, Layout, LogError, Reader, RowFault, escape};
 
 /// Share of a period of the cut-off for which rows may be missing: interpolation is at the noise there.
@@ -308,7 +308,7 @@ impl LoggedRobot {
             speeds.borrow_mut().take(block, conversion);
         };
         let keep = &self.file.log.keep;
-        let gate = Gate::look(&open, keep, &|| control.stopped(), &mut meter)?;
+        let gate = InspectionGate::look(&open, keep, &|| control.stopped(), &mut meter)?;
         Ok(FirstLook {
             gate: gate.ok_or(IdentifyError::Interrupted)?,
             rest_speed: speeds.borrow().resting(),
@@ -448,8 +448,8 @@ impl LoggedRobot {
             joint_q_cutoffs_hz: self.position_cutoffs_hz.to_vec(),
             q_order: f.position_order.map_or(plain.q_order, |o| o as usize),
             differences: match f.differences {
-                Some(DifferencesKind::Central) => Differences::Central,
-                Some(DifferencesKind::HighOrder) | None => Differences::HighOrder,
+                Some(DifferencesKind::Central) => DifferenceFormula::Central,
+                Some(DifferencesKind::HighOrder) | None => DifferenceFormula::HighOrder,
             },
             // torques that hold are brought to their rows' time as the log is read
             torque: TorqueTiming::Sampled,

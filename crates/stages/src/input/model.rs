@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::error::IdentifyError;
 use super::logged_robot::LoggedRobot;
-use cft_ident_core::effect::{self, Added, AugmentedModel, EffectNumber, Law, formula, own};
+use cft_ident_core::effect::{self, AugmentedModel, EffectNumber, Law, ModelEffect, formula, own};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::model::Model;
 use cft_ident_files::config::ModelFile;
@@ -58,12 +58,15 @@ pub(crate) fn own_laws(
     let of = |candidate: &CandidateSection| {
         let unit = |name: &String| candidate.units.get(name).cloned().unwrap_or_default();
         let coefficients = candidate.formulas.iter();
-        let shapes = candidate.shapes.iter().map(|(name, range)| formula::Shape {
-            name: name.clone(),
-            unit: range.unit.clone(),
-            range: [range.from, range.to],
-        });
-        let definition = formula::Definition {
+        let shapes = candidate
+            .shapes
+            .iter()
+            .map(|(name, range)| formula::FormulaShape {
+                name: name.clone(),
+                unit: range.unit.clone(),
+                range: [range.from, range.to],
+            });
+        let definition = formula::FormulaDefinition {
             name: candidate.name.clone(),
             joints: candidate.joints.clone(),
             coefficients: coefficients
@@ -81,7 +84,7 @@ pub(crate) fn own_laws(
 
 /// An effect as a model file holds it.
 pub(crate) fn in_file(
-    effect: &Added,
+    effect: &ModelEffect,
     machine: &LoggedRobot,
     numbers: &[EffectNumber],
 ) -> EffectSection {

@@ -5,7 +5,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
-use cft_ident_core::validate::{Reconstructed, TorqueErrors};
+use cft_ident_core::validate::{ReconstructedRow, TorqueErrors};
 use cft_ident_logs::log::Instant;
 use std::f64::consts::TAU;
 
@@ -15,7 +15,7 @@ const BEYOND_LIMITS_SHARE: f64 = 0.1;
 const ROWS_BEYOND_SHARE: f64 = 0.01;
 
 /// Where joints stand along logs, beside where they can.
-pub(crate) struct Places {
+pub(crate) struct JointRanges {
     /// Limits of each joint that has some, widened.
     limits: Vec<Option<[f64; 2]>>,
     /// Joints that turn: a whole turn more is the same place.
@@ -25,7 +25,7 @@ pub(crate) struct Places {
     rows: u64,
 }
 
-impl Places {
+impl JointRanges {
     pub(crate) fn new(machine: &LoggedRobot) -> Self {
         let limits = machine.robot.joint_names().iter().map(|joint| {
             let [low, high] = machine.file.limits.get(joint)?.position?;
@@ -79,20 +79,20 @@ impl Places {
 const IMPOSSIBLE_TORQUE_RATIO: f64 = 10.0;
 
 /// The largest torques of every joint, measured and reconstructed, and when.
-pub(crate) struct Beyond {
+pub(crate) struct TorquePeaks {
     measured: Vec<f64>,
     reconstructed: Vec<(f64, f64)>,
 }
 
-impl Beyond {
+impl TorquePeaks {
     pub(crate) fn new(joints: usize) -> Self {
-        Beyond {
+        TorquePeaks {
             measured: vec![0.0; joints],
             reconstructed: vec![(0.0, 0.0); joints],
         }
     }
 
-    pub(crate) fn take(&mut self, row: &Reconstructed, origin: Instant) {
+    pub(crate) fn take(&mut self, row: &ReconstructedRow, origin: Instant) {
         for (most, x) in self.measured.iter_mut().zip(row.measured) {
             *most = most.max(x.abs());
         }

@@ -6,7 +6,7 @@ use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
 use cft_ident_core::friction::motions::motions;
 use cft_ident_core::friction::prepare::SmoothedMotion;
-use cft_ident_core::motion::{Differences, FilterSettings};
+use cft_ident_core::motion::{DifferenceFormula, FilterSettings};
 use cft_ident_logs::log::{Block, Provenance};
 
 /// Position cut-off where none is declared \[Hz\]: stationary joints answer to reversals within milliseconds.
@@ -38,7 +38,7 @@ fn processing(machine: &LoggedRobot, rate_hz: f64) -> FilterSettings {
                 .unwrap_or(FRICTION_POSITION_CUTOFF_HZ)
                 .min(0.2 * rate_hz),
         ),
-        differences: Differences::HighOrder,
+        differences: DifferenceFormula::HighOrder,
         q_trim_s: None,
         // the filter takes rows as they come, and needs none between
         bridge_s: 0.0,

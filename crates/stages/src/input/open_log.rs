@@ -9,7 +9,7 @@ use super::held_torque::HeldTorque;
 use cft_ident_core::motion::{MotionError, RunError, Stretch, Summary, ZeroOrderHold};
 use cft_ident_core::number::{self, clock};
 use cft_ident_core::robot::Robot;
-use cft_ident_logs::inspect::Cutter;
+use cft_ident_logs::inspect::RowCutter;
 use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader};
 
 /// A velocity column is off by more than filters and steps make of it.
@@ -25,7 +25,7 @@ pub struct OpenLog<'a> {
     pub(crate) held: Option<&'a HeldTorque>,
     pub(crate) name: String,
     pub(crate) look: Arc<FirstLook>,
-    pub(crate) cutter: Cutter,
+    pub(crate) cutter: RowCutter,
 }
 
 impl OpenLog<'_> {

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::control::{Control, Work};
+use super::control::{Control, ControlledWork};
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
@@ -15,8 +15,8 @@ use cft_ident_core::inertia::closed_loop::LoopGains;
 use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::encoder::{self, GRIDS, NOISY, PositionNoise, accumulate_shifted};
 use cft_ident_core::inertia::instruments::{self, ReferenceSource};
-use cft_ident_core::inertia::jumps::{Jump, jumps};
-use cft_ident_core::inertia::robust::Weigher;
+use cft_ident_core::inertia::jumps::{ResidualJump, jumps};
+use cft_ident_core::inertia::robust::RowWeigher;
 use cft_ident_core::motion::{FilterSettings, Summary};
 use cft_ident_logs::log::{Block, Provenance};
 
@@ -46,15 +46,15 @@ pub(crate) enum PositionFilter {
 }
 
 /// Readings of the same logs, one after the other.
-pub struct Passes<'a> {
+pub struct LogPasses<'a> {
     pub(crate) machine: &'a LoggedRobot,
     pub(crate) logs: &'a [Log],
     pub(crate) control: &'a Control,
-    pub(crate) work: Work,
+    pub(crate) work: ControlledWork,
     pub inputs: Vec<Provenance>,
     pub warnings: Vec<String>,
     /// Stretches in which something pushes the robot, by the places of the logs, by the first reading.
-    pub(crate) jumps: Vec<(usize, Jump)>,
+    pub(crate) jumps: Vec<(usize, ResidualJump)>,
     /// Of the first log, by the first reading.
     pub summary: Option<Summary>,
     /// Sampling step of each log, by the first reading [s].
@@ -69,9 +69,9 @@ pub struct Passes<'a> {
     order: Vec<usize>,
 }
 
-impl<'a> Passes<'a> {
+impl<'a> LogPasses<'a> {
     pub fn new(machine: &'a LoggedRobot, logs: &'a [Log], control: &'a Control) -> Self {
-        Passes {
+        LogPasses {
             machine,
             logs,
             control,
@@ -90,7 +90,7 @@ impl<'a> Passes<'a> {
 
     /// The same with the rests and the smoothing that each log calls for by itself.
     pub(crate) fn each_by_itself(self, own: Vec<OwnSettings>) -> Self {
-        Passes { own, ..self }
+        LogPasses { own, ..self }
     }
 
     /// Samples at standstill of these joints count from here on; not where logs were reduced without them.
@@ -174,7 +174,7 @@ impl<'a> Passes<'a> {
         &mut self,
         filter: PositionFilter,
         columns: &RegressorColumns,
-        weigher: Option<&mut Weigher>,
+        weigher: Option<&mut RowWeigher>,
     ) -> Result<BlockFactors, IdentifyError> {
         self.read_as(filter, columns, weigher, false)
     }
@@ -183,7 +183,7 @@ impl<'a> Passes<'a> {
         &mut self,
         filter: PositionFilter,
         columns: &RegressorColumns,
-        mut weigher: Option<&mut Weigher>,
+        mut weigher: Option<&mut RowWeigher>,
         condensed: bool,
     ) -> Result<BlockFactors, IdentifyError> {
         let first = self.summary.is_none();
@@ -325,7 +325,7 @@ impl<'a> Passes<'a> {
         columns: RegressorColumns,
         reading: u32,
         index: usize,
-        weigher: Option<&mut Weigher>,
+        weigher: Option<&mut RowWeigher>,
     ) -> Result<BlockFactors, IdentifyError> {
         let log = &self.logs[index];
         let steps = self.noise_that_tells(index);
@@ -363,7 +363,7 @@ impl<'a> Passes<'a> {
         &mut self,
         columns: &RegressorColumns,
         grid: u32,
-        mut weigher: Option<&mut Weigher>,
+        mut weigher: Option<&mut RowWeigher>,
     ) -> Result<Option<BlockFactors>, IdentifyError> {
         let unknown = self.machine.robot.transmission().encoder_steps().is_none();
         if unknown && (0..self.logs.len()).all(|log| self.noise_that_tells(log).is_none()) {

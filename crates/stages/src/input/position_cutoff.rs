@@ -13,7 +13,7 @@ use super::logged_robot::LoggedRobot;
 use super::open_log::OpenLog;
 use super::own_settings::{CutoffCosts, JointCost, OwnSettings};
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::inertia::solve::Fit;
 use cft_ident_core::motion::position_cutoff::{CutoffCost, CutoffTrial, candidates, least};
 use cft_ident_core::motion::{FilterSettings, RunError, Stretch, stretches};
@@ -150,9 +150,11 @@ fn coulomb_level(columns: &RegressorColumns, fit: &Fit, joint: usize) -> f64 {
     let first = columns.first_own(joint);
     let own = columns.own[joint].iter().enumerate();
     let coulomb = own.filter(|(_, own)| match own {
-        Own::Coulomb | Own::Saturating(_) => true,
-        Own::Law(k) => (1..3).contains(k),
-        Own::Viscous | Own::Offset | Own::TorqueRate | Own::TorqueBend => false,
+        JointTerm::Coulomb | JointTerm::Saturating(_) => true,
+        JointTerm::Law(k) => (1..3).contains(k),
+        JointTerm::Viscous | JointTerm::Offset | JointTerm::TorqueRate | JointTerm::TorqueBend => {
+            false
+        }
     });
     coulomb
         .map(|(k, _)| fit.theta[first + k])
@@ -166,7 +168,7 @@ pub(crate) fn known(model: &Model) -> Vec<Option<JointFriction>> {
 }
 
 /// Opens a log for its positions.
-type Open<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
+type LogOpener<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
 
 impl LoggedRobot {
     /// The same robot with the position cut-offs that its logs call for; a law is none where it is not known.
@@ -209,7 +211,7 @@ impl LoggedRobot {
         logs: &[Log],
         laws: &[Option<JointFriction>],
         rest_speed: &[f64],
-        open: Open,
+        open: LogOpener,
     ) -> Result<LoggedRobot, IdentifyError> {
         if !self.finds_cutoffs() {
             return Ok(self.clone());
@@ -309,7 +311,7 @@ impl LoggedRobot {
         logs: &[Log],
         laws: &[Option<JointFriction>],
         rest_speed: &[f64],
-        open: Open,
+        open: LogOpener,
     ) -> Result<CutoffCosts, IdentifyError> {
         let settings = self.settings();
         let raw = FilterSettings {

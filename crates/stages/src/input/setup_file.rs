@@ -6,37 +6,37 @@ use crate::setup::Correction;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::COORDINATES;
 use cft_ident_files::config::RobotFile;
-use cft_ident_files::config::correction::Edit;
+use cft_ident_files::config::correction::KeyEdit;
 use cft_ident_logs::log::PositionUnit;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 /// The keys of a channel in `[log.joint]`, and of a motor in `[log.actuator]`.
-struct Keys {
+struct ChannelKeys {
     table: &'static str,
     torque: &'static str,
     zero: &'static str,
 }
 
-const JOINT: Keys = Keys {
+const JOINT: ChannelKeys = ChannelKeys {
     table: "joint",
     torque: "torque",
     zero: "position_offset",
 };
-const MOTOR: Keys = Keys {
+const MOTOR: ChannelKeys = ChannelKeys {
     table: "actuator",
     torque: "volts",
     zero: "home",
 };
 
 /// The channels of a file as tables.
-pub(crate) struct Declared<'a> {
+pub(crate) struct ChannelTables<'a> {
     file: &'a RobotFile,
     motors: bool,
 }
 
-impl<'a> Declared<'a> {
+impl<'a> ChannelTables<'a> {
     pub fn new(file: &'a RobotFile, motors: bool) -> Self {
         Self { file, motors }
     }
@@ -48,7 +48,7 @@ impl<'a> Declared<'a> {
         }
     }
 
-    fn keys(&self) -> Keys {
+    fn keys(&self) -> ChannelKeys {
         if self.motors { MOTOR } else { JOINT }
     }
 
@@ -80,15 +80,15 @@ impl<'a> Declared<'a> {
     }
 
     /// The lines that a correction asks for.
-    pub fn edits(&self, by: &Correction) -> Vec<Edit> {
+    pub fn edits(&self, by: &Correction) -> Vec<KeyEdit> {
         let mut out = Vec::new();
         if let Some(g) = by.gravity.filter(|g| Some(*g) != self.file.robot.gravity) {
-            out.push(Edit::new(&["robot", "gravity"], g.to_vec()));
+            out.push(KeyEdit::new(&["robot", "gravity"], g.to_vec()));
         }
         let (names, keys) = (self.names(), self.keys());
         for (j, name) in names.iter().enumerate() {
             let mut set = |key: &str, value: Value| {
-                out.push(Edit::new(&["log", keys.table, name, key], value));
+                out.push(KeyEdit::new(&["log", keys.table, name, key], value));
             };
             let (p, t) = (by.position_from[j], by.torque_from[j]);
             let (pf, tf) = (by.position_factor[j], by.torque_factor[j]);
@@ -164,7 +164,7 @@ impl<'a> Declared<'a> {
     }
 
     /// The robot file with these lines.
-    pub fn corrected(&self, edits: &[Edit], by: &Correction) -> RobotFile {
+    pub fn corrected(&self, edits: &[KeyEdit], by: &Correction) -> RobotFile {
         let mut out = self.file.clone();
         out.robot.gravity = by.gravity.or(out.robot.gravity);
         for edit in edits.iter().filter(|edit| edit.path.len() == 4) {
@@ -177,7 +177,7 @@ impl<'a> Declared<'a> {
     }
 }
 
-fn set<T: Serialize + DeserializeOwned>(of: &mut BTreeMap<String, T>, edit: &Edit) {
+fn set<T: Serialize + DeserializeOwned>(of: &mut BTreeMap<String, T>, edit: &KeyEdit) {
     let (name, key) = (&edit.path[2], &edit.path[3]);
     let mut table = keys_of(of.get(name));
     table.insert(key.clone(), edit.value.clone());
@@ -196,13 +196,13 @@ pub(crate) fn differences<T: Serialize>(
     table: &str,
     new: &BTreeMap<String, T>,
     old: &BTreeMap<String, T>,
-    out: &mut Vec<Edit>,
+    out: &mut Vec<KeyEdit>,
 ) {
     for (name, channels) in new {
         let before = keys_of(old.get(name));
         for (key, value) in keys_of(Some(channels)) {
             if before.get(&key) != Some(&value) {
-                out.push(Edit::new(&["log", table, name, &key], value));
+                out.push(KeyEdit::new(&["log", table, name, &key], value));
             }
         }
     }

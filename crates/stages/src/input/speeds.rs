@@ -1,6 +1,6 @@
 //! How fast the joints of a log move, by which a rest is distinguished from a slow motion.
 
-use cft_ident_logs::log::{Block, Conversion};
+use cft_ident_logs::log::{Block, RowConversion};
 
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against a motion.
 const SPACING_S: f64 = 0.02;
@@ -23,7 +23,7 @@ const MIN_VELOCITY_CORRELATION: f64 = 0.9;
 
 /// Sums of a joint's velocity column v and the derivative d of its position.
 #[derive(Debug, Clone, Copy, Default)]
-struct Pair {
+struct SpeedProducts {
     vv: f64,
     dd: f64,
     vd: f64,
@@ -68,7 +68,7 @@ pub(crate) struct SpeedMeter {
     /// Velocities between two positions whose speed is formed, summed, and how many they are.
     between: Vec<f64>,
     rows_between: u64,
-    pairs: Vec<Pair>,
+    pairs: Vec<SpeedProducts>,
     last: Option<f64>,
     before: Vec<f64>,
     now: Vec<f64>,
@@ -103,7 +103,7 @@ impl SpeedMeter {
     }
 
     /// Takes a block of what was logged; `conversion` makes joint positions of it.
-    pub(crate) fn take(&mut self, block: &Block, conversion: Option<&Conversion>) {
+    pub(crate) fn take(&mut self, block: &Block, conversion: Option<&RowConversion>) {
         let n = block.joints();
         if n == 0 {
             return;
@@ -113,7 +113,7 @@ impl SpeedMeter {
         }
         self.squares.resize(n, 0.0);
         self.fastest.resize(n, 0.0);
-        self.pairs.resize(n, Pair::default());
+        self.pairs.resize(n, SpeedProducts::default());
         self.between.resize(n, 0.0);
         for (k, (t, q)) in block.t.iter().zip(block.q.chunks_exact(n)).enumerate() {
             self.rows.take(*t, q);
@@ -181,7 +181,7 @@ impl SpeedMeter {
 
     /// Velocity column over the derivative of the position, joint by joint; none where it does not follow that.
     pub(crate) fn velocities(&self) -> Vec<Option<f64>> {
-        let factor = |p: &Pair| {
+        let factor = |p: &SpeedProducts| {
             let follows =
                 p.vd.abs() > MIN_VELOCITY_CORRELATION * (p.vv * p.dd).sqrt() && p.dd > 0.0;
             follows.then(|| p.vd / p.dd)

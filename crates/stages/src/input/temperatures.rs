@@ -6,20 +6,20 @@ use super::logged_robot::LoggedRobot;
 use cft_ident_core::effect::{AugmentedModel, Law};
 use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::motion::Stretch;
-use cft_ident_logs::log::{Instant, LogError, Temperatures};
+use cft_ident_logs::log::{Instant, JointTemperatures, LogError};
 
 /// A temperature that an effect takes.
-pub(crate) struct Taken {
+pub(crate) struct EffectTemperature {
     effect: String,
     joint: usize,
 }
 
 /// Those that the effects of a model take.
-pub(crate) fn of_model(model: &AugmentedModel) -> Vec<Taken> {
+pub(crate) fn of_model(model: &AugmentedModel) -> Vec<EffectTemperature> {
     let effects = model.effects.iter().flat_map(|effect| {
         let title = effect.title(&model.model.robot);
         let joints = effect.temperatures().into_iter();
-        joints.map(move |joint| Taken {
+        joints.map(move |joint| EffectTemperature {
             effect: title.clone(),
             joint,
         })
@@ -28,13 +28,13 @@ pub(crate) fn of_model(model: &AugmentedModel) -> Vec<Taken> {
 }
 
 /// Those that effects of the user's own take at any joint where they are tried.
-pub(crate) fn of_laws(laws: &[&Law]) -> Vec<Taken> {
+pub(crate) fn of_laws(laws: &[&Law]) -> Vec<EffectTemperature> {
     let all = laws.iter().filter_map(|law| Some((law, law.formula?)));
     let taken = all.flat_map(|(law, formula)| {
         let joints = formula.joints().iter();
         joints.flat_map(|j| {
             let taken = formula.temperatures(*j).into_iter();
-            taken.map(|joint| Taken {
+            taken.map(|joint| EffectTemperature {
                 effect: law.entry.name.to_owned(),
                 joint,
             })
@@ -63,13 +63,13 @@ impl LoggedRobot {
     ///
     /// # Errors
     /// A log that lacks a column that is named, or a temperature that is no number.
-    pub fn temperatures(&self, log: &Log, origin: Instant) -> Result<Temperatures, LogError> {
+    pub fn temperatures(&self, log: &Log, origin: Instant) -> Result<JointTemperatures, LogError> {
         match (log, self.file.temperature_layout()) {
             (Log::File(spec), Some((joints, layout))) => {
-                Temperatures::read(spec, (&joints, &layout), origin)
+                JointTemperatures::read(spec, (&joints, &layout), origin)
             }
             (Log::Arrays(arrays), _) => Ok(arrays.temperatures()),
-            _ => Ok(Temperatures::default()),
+            _ => Ok(JointTemperatures::default()),
         }
     }
 
@@ -107,11 +107,11 @@ impl LoggedRobot {
     /// The same of effects in any place.
     pub(crate) fn check_taken(
         &self,
-        taken: &[Taken],
+        taken: &[EffectTemperature],
         logs: &[Log],
         stretches: &[Stretch],
     ) -> Result<(), IdentifyError> {
-        for Taken { effect, joint } in taken {
+        for EffectTemperature { effect, joint } in taken {
             let lacking = stretches.iter().find(|s| !s.has_temperature(*joint));
             if let Some(log) = lacking.and_then(|s| logs.get(s.log)) {
                 return Err(self.no_temperature(log, effect, *joint));
@@ -126,14 +126,16 @@ impl LoggedRobot {
         model: &AugmentedModel,
         log: &Log,
         origin: Instant,
-    ) -> Result<Temperatures, IdentifyError> {
+    ) -> Result<JointTemperatures, IdentifyError> {
         let taken = of_model(model);
         if taken.is_empty() {
-            return Ok(Temperatures::default());
+            return Ok(JointTemperatures::default());
         }
         let found = self.temperatures(log, origin).unwrap_or_default();
         match taken.iter().find(|t| found.at(t.joint, 0.0).is_none()) {
-            Some(Taken { effect, joint }) => Err(self.no_temperature(log, effect, *joint)),
+            Some(EffectTemperature { effect, joint }) => {
+                Err(self.no_temperature(log, effect, *joint))
+            }
             None => Ok(found),
         }
     }

@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::logged_robot::LoggedRobot;
-use cft_ident_core::inertia::columns::{KnownFriction, Own, RegressorColumns};
-use cft_ident_core::inertia::essential::Essential;
+use cft_ident_core::inertia::columns::{JointTerm, KnownFriction, RegressorColumns};
+use cft_ident_core::inertia::essential::EssentialParameters;
 use cft_ident_core::inertia::solve::Fit;
 use cft_ident_core::inertia::verdict::verdict;
 use cft_ident_core::verdict::Verdict;
@@ -82,10 +82,10 @@ pub(crate) fn columns(
     for j in 0..n {
         match friction {
             Some(of_joints) => known[j] = Some(of_joints[j].clone()),
-            None => own[j].extend([Own::Viscous, Own::Coulomb]),
+            None => own[j].extend([JointTerm::Viscous, JointTerm::Coulomb]),
         }
         if section.offset {
-            own[j].push(Own::Offset);
+            own[j].push(JointTerm::Offset);
         }
     }
     RegressorColumns {
@@ -102,7 +102,7 @@ pub(crate) fn unknowns(
     machine: &LoggedRobot,
     columns: &RegressorColumns,
     fit: &Fit,
-    essential: &Essential,
+    essential: &EssentialParameters,
 ) -> Vec<FittedUnknown> {
     let robot = &machine.robot;
     // of the unknown in column i

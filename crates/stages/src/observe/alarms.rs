@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::Observed;
+use super::ExternalTorques;
 use super::excesses::hold_s;
 use cft_ident_files::config::held_out::HeldOut;
 
@@ -19,7 +19,8 @@ pub struct JointOfAlarm {
 
 /// External torques beyond the threshold, from the first to the last sample.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Alarm {
+#[schemars(rename = "Alarm")]
+pub struct TorqueAlarm {
     /// Time of the first sample beyond \[s\].
     pub from_s: f64,
     /// Time of the last \[s\].
@@ -29,18 +30,18 @@ pub struct Alarm {
 }
 
 /// Finds alarms in external torques.
-pub struct Alarms<'a> {
+pub struct AlarmDetector<'a> {
     held: &'a [HeldOut],
     threshold: f64,
     hold_s: f64,
     std: Vec<f64>,
-    open: Option<Alarm>,
+    open: Option<TorqueAlarm>,
     /// Samples so far, and those in which an alarm was on.
     samples: u64,
     beyond: u64,
 }
 
-impl<'a> Alarms<'a> {
+impl<'a> AlarmDetector<'a> {
     /// Alarms beyond `threshold` times the 99 % torques of each joint.
     pub fn new(held: &'a [HeldOut], threshold: f64, cutoff_hz: f64) -> Self {
         Self {
@@ -55,7 +56,7 @@ impl<'a> Alarms<'a> {
     }
 
     /// Takes a sample; the alarm that it shows to be over.
-    pub fn take(&mut self, o: &Observed) -> Option<Alarm> {
+    pub fn take(&mut self, o: &ExternalTorques) -> Option<TorqueAlarm> {
         let mut over = match &self.open {
             Some(open) if o.begins || o.t - open.to_s > self.hold_s => self.open.take(),
             _ => None,
@@ -69,7 +70,7 @@ impl<'a> Alarms<'a> {
                 continue;
             }
             any = true;
-            let open = self.open.get_or_insert_with(|| Alarm {
+            let open = self.open.get_or_insert_with(|| TorqueAlarm {
                 from_s: o.t,
                 to_s: o.t,
                 joints: Vec::with_capacity(self.held.len()),
@@ -95,12 +96,12 @@ impl<'a> Alarms<'a> {
     }
 
     /// The alarm that is on.
-    pub fn open(&self) -> Option<&Alarm> {
+    pub fn open(&self) -> Option<&TorqueAlarm> {
         self.open.as_ref()
     }
 
     /// The alarm that the end of the input ends.
-    pub fn end(&mut self) -> Option<Alarm> {
+    pub fn end(&mut self) -> Option<TorqueAlarm> {
         self.open.take()
     }
 
@@ -122,7 +123,7 @@ mod tests {
             external_99: 2.0,
             ..HeldOut::default()
         });
-        let mut alarms = Alarms::new(&held, 1.5, 10.0);
+        let mut alarms = AlarmDetector::new(&held, 1.5, 10.0);
         let mut over = Vec::new();
         for k in 0..2000 {
             let t = f64::from(k) * 1e-3;
@@ -131,7 +132,7 @@ mod tests {
             let b = if (700..800).contains(&k) { -1.8 } else { b };
             let a = if k == 1500 { 1.51 } else { 1.4 };
             let zero = [0.0; 2];
-            over.extend(alarms.take(&Observed {
+            over.extend(alarms.take(&ExternalTorques {
                 t,
                 external: &[a, b],
                 variance: &zero,

@@ -1,7 +1,7 @@
 //! From external torques of an untouched robot to deviations and thresholds.
 
 use crate::band::quantile;
-use cft_ident_files::config::held_out::{Excesses, HeldOut};
+use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 
 /// Samples of a period of the cut-off that are kept.
 pub const KEPT: f64 = 20.0;
@@ -36,7 +36,7 @@ pub struct QuietSample<'a> {
 
 /// External torques of a robot that nothing touched: hundreds of thousands, of which seven digits are enough.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Quiet {
+pub struct QuietTorques {
     /// Time since the sample before \[s\], infinite where none goes before.
     gaps: Vec<f64>,
     /// External torques, speeds and variances of each sample.
@@ -47,13 +47,14 @@ pub struct Quiet {
     pub step_s: f64,
 }
 
+/// External torques of one row of an untouched robot.
 #[derive(Clone, Copy)]
-struct Kept<'a> {
+struct QuietRow<'a> {
     gap: f64,
     numbers: &'a [f32],
 }
 
-impl Kept<'_> {
+impl QuietRow<'_> {
     /// Of a joint: external torque, speed, variance.
     fn of(&self, j: usize) -> [f64; 3] {
         let n = self.numbers.len() / 3;
@@ -67,7 +68,7 @@ impl Kept<'_> {
     }
 }
 
-impl Quiet {
+impl QuietTorques {
     pub fn push(&mut self, sample: QuietSample) {
         self.gaps.push(match sample.begins {
             true => f64::INFINITY,
@@ -79,11 +80,11 @@ impl Quiet {
         }
     }
 
-    fn samples(&self) -> impl Iterator<Item = Kept<'_>> + Clone {
+    fn samples(&self) -> impl Iterator<Item = QuietRow<'_>> + Clone {
         let width = self.numbers.len() / self.gaps.len().max(1);
         let rows = self.numbers.chunks_exact(width.max(1));
         let each = self.gaps.iter().zip(rows);
-        each.map(|(gap, numbers)| Kept { gap: *gap, numbers })
+        each.map(|(gap, numbers)| QuietRow { gap: *gap, numbers })
     }
 
     /// Completes what was held out with deviations of external torques; excesses where there are enough samples.
@@ -92,7 +93,7 @@ impl Quiet {
         held: &mut [HeldOut],
         cutoff_hz: f64,
         position_cutoff_hz: f64,
-    ) -> Option<Excesses> {
+    ) -> Option<TorqueExcesses> {
         if self.gaps.len() < MIN_SAMPLES {
             return None;
         }
@@ -121,7 +122,7 @@ impl Quiet {
             let mut shares: Vec<f64> = self.samples().map(|s| s.share(j, held)).collect();
             held.external_99 = quantile(&mut shares, 0.99).max(f64::MIN_POSITIVE);
         }
-        let greatest = |s: Kept| {
+        let greatest = |s: QuietRow| {
             let each = held.iter().enumerate().map(|(j, held)| {
                 let [external, speed, variance] = s.of(j);
                 external.abs() / (held.external_std(speed, variance) * held.external_99)
@@ -144,7 +145,7 @@ impl Quiet {
         let mut largest = peaks.clone();
         largest.sort_by(|a, b| b.total_cmp(a));
         largest.truncate(MAX_PEAKS);
-        Some(Excesses {
+        Some(TorqueExcesses {
             observed_s: self.gaps.len() as f64 * self.step_s,
             position_cutoff_hz,
             level: *level,
@@ -221,9 +222,9 @@ mod tests {
     fn the_threshold_is_crossed_as_often_as_was_stated() {
         // bursts of 10 samples whose sizes have exponential tails, one joint, 100 Hz
         let burst = |k: usize| -(1.0 - uniform(k / 10)).ln();
-        let mut quiet = Quiet {
+        let mut quiet = QuietTorques {
             step_s: 0.01,
-            ..Quiet::default()
+            ..QuietTorques::default()
         };
         for k in 0..200_000 {
             let external = match k % 100 < 10 {

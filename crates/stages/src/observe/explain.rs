@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::Observed;
+use super::ExternalTorques;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::friction::sign;
 
@@ -24,7 +24,8 @@ pub struct ExplainedNumber {
 
 /// A change of the robot that explains external torques.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Explanation {
+#[schemars(rename = "Explanation")]
+pub struct TorqueExplanation {
     /// "payload" or "friction".
     pub kind: &'static str,
     /// The joint whose friction changed; none for a payload.
@@ -35,10 +36,10 @@ pub struct Explanation {
 }
 
 /// Sums over the samples of alarms: a payload's columns and each joint's friction.
-pub struct Explainer {
+pub struct TorqueExplainer {
     robot: Robot,
-    payload: Sums,
-    friction: Vec<Sums>,
+    payload: NormalSums,
+    friction: Vec<NormalSums>,
     /// Squares of each joint's external torques over their deviations.
     power: Vec<f64>,
     rows: f64,
@@ -46,13 +47,14 @@ pub struct Explainer {
     next: f64,
 }
 
+/// Normal equations: products of the columns with one another and with the right side.
 #[derive(Clone)]
-struct Sums {
+struct NormalSums {
     normal: DMatrix<f64>,
     right: DVector<f64>,
 }
 
-impl Sums {
+impl NormalSums {
     fn new(size: usize) -> Self {
         Self {
             normal: DMatrix::zeros(size, size),
@@ -86,14 +88,14 @@ impl Sums {
     }
 }
 
-impl Explainer {
+impl TorqueExplainer {
     /// Nothing yet; rows are taken two a period of the cut-off, as nearer ones say the same.
     pub fn new(robot: Robot, cutoff_hz: f64) -> Self {
         let n = robot.joints();
         Self {
             robot,
-            payload: Sums::new(4),
-            friction: vec![Sums::new(2); n],
+            payload: NormalSums::new(4),
+            friction: vec![NormalSums::new(2); n],
             power: vec![0.0; n],
             rows: 0.0,
             every_s: 0.5 / cutoff_hz,
@@ -102,7 +104,7 @@ impl Explainer {
     }
 
     /// Takes a sample of an alarm.
-    pub fn take(&mut self, o: &Observed, std: &[f64]) {
+    pub fn take(&mut self, o: &ExternalTorques, std: &[f64]) {
         if o.t < self.next {
             return;
         }
@@ -118,15 +120,15 @@ impl Explainer {
     }
 
     /// The explanation that takes away most, where one takes away enough.
-    pub fn explanation(&self) -> Option<Explanation> {
+    pub fn explanation(&self) -> Option<TorqueExplanation> {
         let all: f64 = self.power.iter().sum();
         if all <= 0.0 || self.rows < MIN_ROWS_PER_NUMBER {
             return None;
         }
         let n = self.friction.len() as f64;
         let names = self.robot.joint_names();
-        let mut best: Option<(f64, Explanation)> = None;
-        let mut propose = |sums: &Sums, kind, joint: Option<usize>| {
+        let mut best: Option<(f64, TorqueExplanation)> = None;
+        let mut propose = |sums: &NormalSums, kind, joint: Option<usize>| {
             let (x, covariance, power) = sums.solve();
             let left = (all - power).max(0.0);
             // what is left counts as noise where it is more than that
@@ -169,7 +171,7 @@ impl Explainer {
                 }
             }
             let joint = joint.map(|j| names[j].clone());
-            let found = Explanation {
+            let found = TorqueExplanation {
                 kind,
                 joint,
                 share,

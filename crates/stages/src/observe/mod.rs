@@ -16,10 +16,10 @@ mod explain;
 mod observer;
 mod recipe;
 
-pub use alarms::{Alarm, Alarms, JointOfAlarm};
-pub(crate) use excesses::{KEPT, Quiet, QuietSample};
-pub(crate) use explain::Explainer;
-pub use explain::{ExplainedNumber, Explanation};
-pub use observer::{Observed, Observer};
-pub use recipe::Recipe;
+pub use alarms::{AlarmDetector, JointOfAlarm, TorqueAlarm};
+pub(crate) use excesses::{KEPT, QuietSample, QuietTorques};
+pub(crate) use explain::TorqueExplainer;
+pub use explain::{ExplainedNumber, TorqueExplanation};
+pub use observer::{ExternalTorques, Observer};
+pub use recipe::ObserverRecipe;
 pub(crate) use recipe::recipe;

@@ -1,11 +1,11 @@
 //! From rows to external torques.
 
 use crate::band::Directions;
-use cft_ident_core::effect::{AugmentedModel, Sampled};
-use cft_ident_core::math::causal::{Causal, delay_samples};
-use cft_ident_core::math::sos::Sos;
+use cft_ident_core::effect::{AugmentedModel, SampledModel};
+use cft_ident_core::math::causal::{CausalSections, delay_samples};
+use cft_ident_core::math::sos::SosFilter;
 use cft_ident_core::motion::{CausalMotion, FilterSettings, MotionError, MotionSample};
-use cft_ident_logs::log::{Block, Temperatures};
+use cft_ident_logs::log::{Block, JointTemperatures};
 
 /// Order of the last low-pass.
 pub(super) const ORDER: usize = 2;
@@ -16,7 +16,7 @@ const NODES: usize = 4;
 
 /// External torques of one sample; what they are of lies [`Observer::delay_s`] before its time.
 #[derive(Debug, Clone, Copy)]
-pub struct Observed<'a> {
+pub struct ExternalTorques<'a> {
     /// Time of the newest row \[s\].
     pub t: f64,
     /// \[N or Nm\]
@@ -38,17 +38,17 @@ pub struct Observer {
     model: AugmentedModel,
     uncertain: Option<Directions>,
     cutoff_hz: f64,
-    core: Option<Core>,
+    core: Option<ObserverCore>,
     first: Option<f64>,
-    temperatures: Temperatures,
+    temperatures: JointTemperatures,
 }
 
-struct Core {
-    plant: Sampled,
-    smooth: Causal,
+struct ObserverCore {
+    plant: SampledModel,
+    smooth: CausalSections,
     settle: usize,
     delay_s: f64,
-    late: Option<Late>,
+    late: Option<TorqueDelay>,
     /// Samples since the stretch began.
     count: usize,
     tau: Vec<f64>,
@@ -58,7 +58,7 @@ struct Core {
 }
 
 /// Torques of the last samples, where the model's come late or early.
-pub(super) struct Late {
+pub(super) struct TorqueDelay {
     /// Samples by which the torque of each joint is late.
     pub by: Vec<f64>,
     /// Samples that are waited for.
@@ -79,7 +79,7 @@ impl Observer {
             cutoff_hz: settings.cutoff_hz,
             core: None,
             first: None,
-            temperatures: Temperatures::default(),
+            temperatures: JointTemperatures::default(),
         })
     }
 
@@ -93,7 +93,7 @@ impl Observer {
     }
 
     /// Takes the temperatures of the log that it observes.
-    pub fn set_temperatures(&mut self, temperatures: Temperatures) {
+    pub fn set_temperatures(&mut self, temperatures: JointTemperatures) {
         self.temperatures = temperatures;
     }
 
@@ -113,7 +113,7 @@ impl Observer {
         &mut self,
         rows: &Block,
         last: bool,
-        out: &mut dyn FnMut(&Observed),
+        out: &mut dyn FnMut(&ExternalTorques),
     ) -> Result<(), MotionError> {
         self.first = self.first.or(rows.t.first().copied());
         let first = self.first.unwrap_or(0.0);
@@ -125,7 +125,7 @@ impl Observer {
                 return;
             }
             if core.is_none() {
-                match Core::design(model, cutoff, dt) {
+                match ObserverCore::design(model, cutoff, dt) {
                     Ok(designed) => *core = Some(designed),
                     Err(error) => failed = Some(error),
                 }
@@ -140,17 +140,17 @@ impl Observer {
     }
 }
 
-impl Core {
+impl ObserverCore {
     fn design(model: &AugmentedModel, cutoff_hz: f64, dt: f64) -> Result<Self, MotionError> {
         let n = model.model.robot.joints();
-        let sos = Sos::butterworth(ORDER, cutoff_hz, 1.0 / dt)?;
-        let late = Late::of(model, dt);
+        let sos = SosFilter::butterworth(ORDER, cutoff_hz, 1.0 / dt)?;
+        let late = TorqueDelay::of(model, dt);
         let lead = late.as_ref().map_or(0, |late| late.lead);
         Ok(Self {
-            plant: Sampled::new(model.clone(), dt),
+            plant: SampledModel::new(model.clone(), dt),
             settle: sos.settle_samples(SETTLED),
             delay_s: dt * (delay_samples(&sos) + lead as f64),
-            smooth: Causal::new(Some(&sos), 2 * n),
+            smooth: CausalSections::new(Some(&sos), 2 * n),
             late,
             count: 0,
             tau: vec![0.0; n],
@@ -165,7 +165,7 @@ impl Core {
         sample: &MotionSample,
         begins: bool,
         uncertain: &mut Option<Directions>,
-        out: &mut dyn FnMut(&Observed),
+        out: &mut dyn FnMut(&ExternalTorques),
     ) {
         let n = self.tau.len();
         if begins {
@@ -201,7 +201,7 @@ impl Core {
         if let Some(directions) = uncertain {
             directions.variances(motion, &mut self.variance);
         }
-        out(&Observed {
+        out(&ExternalTorques {
             t: sample.t,
             external: &self.row[..n],
             speed: &self.row[n..],
@@ -214,12 +214,12 @@ impl Core {
     }
 }
 
-impl Late {
+impl TorqueDelay {
     /// For the shifts of a model; none where it has none.
     pub(super) fn of(model: &AugmentedModel, dt: f64) -> Option<Self> {
         let joints = 0..model.model.robot.joints();
         let by: Vec<f64> = joints.map(|j| model.shift(j) / dt).collect();
-        by.iter().any(|d| *d != 0.0).then(|| Late::new(by))
+        by.iter().any(|d| *d != 0.0).then(|| TorqueDelay::new(by))
     }
 
     fn new(by: Vec<f64>) -> Self {
@@ -300,7 +300,7 @@ mod tests {
     fn check(model: AugmentedModel, late: f64) -> f64 {
         let mut observer = Observer::new(model, &FilterSettings::default()).unwrap();
         let mut found = Vec::new();
-        let push = &mut |o: &Observed| found.push((o.t, o.external[0]));
+        let push = &mut |o: &ExternalTorques| found.push((o.t, o.external[0]));
         observer.push(&rows(late), true, push).unwrap();
         let delay = observer.delay_s().unwrap();
         for (t, x) in &found {

@@ -1,14 +1,15 @@
 //! Windows of one axis side by side: all of them a step on at a time, so that a law of speed is asked once for all.
 //! Effects depend on the speed of now alone.
 
-use super::stepper::{Held, held, stopped_by};
+use super::stepper::{StepFriction, held, stopped_by};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::dynamics::Dynamics;
+use cft_ident_core::robot::dynamics::RobotDynamics;
 
-pub(super) struct Abreast<'a> {
+/// Windows of one length that are rolled out abreast.
+pub(super) struct ParallelWindows<'a> {
     model: &'a AugmentedModel,
-    dynamics: Dynamics,
+    dynamics: RobotDynamics,
     dt: f64,
     jumps: bool,
     /// Mass of an axis without links, the same everywhere; nothing else acts on it.
@@ -17,7 +18,7 @@ pub(super) struct Abreast<'a> {
     at: Stretch,
 }
 
-impl<'a> Abreast<'a> {
+impl<'a> ParallelWindows<'a> {
     /// Begins at these samples of a stretch, for steps of `dt` seconds.
     pub fn begin(
         model: &'a AugmentedModel,
@@ -70,7 +71,7 @@ impl<'a> Abreast<'a> {
             if self.mass.is_none() {
                 (self.dynamics).inertia_and_bias(&[*q], &[*v], &mut mass, &mut bias);
             }
-            let Held {
+            let StepFriction {
                 torque,
                 slope,
                 limit,

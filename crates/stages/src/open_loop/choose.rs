@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::fit::{Fitted, POSITIONS, RunSpan, apart, errors, fit, rms, windows};
+use super::fit::{POSITIONS, RunSpan, WindowFit, apart, errors, fit, rms, windows};
 use super::numbers::{Columns, columns, numbers};
 use cft_ident_core::effect::{
-    Added, AugmentedModel, Cover, Family, LAWS, Law, Place, Role, Search,
+    AugmentedModel, EffectPlace, Family, LAWS, Law, LogCoverage, ModelEffect, Role, ShapeSearch,
 };
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
 
@@ -88,7 +88,7 @@ pub struct AxisFit {
     pub before: PositionErrors,
     /// After; blocks are those of fits without them.
     pub after: PositionErrors,
-    pub ending: Ending,
+    pub ending: IterationEnding,
     /// Steps of the last fit.
     pub steps: usize,
     pub tried: Vec<TriedAxis>,
@@ -103,7 +103,7 @@ pub fn fit_axis(
 ) -> Result<AxisFit, AxisError> {
     let trial = Trial {
         stretches,
-        cover: Cover::of(&start.model.robot, stretches, 0.0),
+        cover: LogCoverage::of(&start.model.robot, stretches, 0.0),
         offset,
         stop,
     };
@@ -125,12 +125,12 @@ pub fn fit_axis(
     let mut model = start.clone();
     let mut chosen = trial.best_length(start, &lengths, &mut tried)?;
     loop {
-        let mut best: Option<(Chosen, AugmentedModel)> = None;
+        let mut best: Option<(WindowChoice, AugmentedModel)> = None;
         for rival in trial.rivals(&model) {
-            let effect = rival.effects.last().map(Added::name);
+            let effect = rival.effects.last().map(ModelEffect::name);
             let found = trial.tried((&rival, &rival), (chosen.length, effect), &mut tried)?;
             let least = best.as_ref().map(|(best, _)| best.error);
-            let better = |found: &Chosen| least.is_none_or(|least| found.error < least);
+            let better = |found: &WindowChoice| least.is_none_or(|least| found.error < least);
             best = found.filter(better).map(|found| (found, rival)).or(best);
         }
         let enough = (1.0 - MIN_GAIN) * chosen.error;
@@ -177,7 +177,7 @@ pub fn fit_axis(
 }
 
 /// A model with a length of windows, tried on blocks set aside.
-struct Chosen {
+struct WindowChoice {
     /// On blocks set aside.
     error: f64,
     length: f64,
@@ -189,7 +189,7 @@ struct Chosen {
 
 struct Trial<'a> {
     stretches: &'a [Stretch],
-    cover: Cover,
+    cover: LogCoverage,
     offset: bool,
     stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -233,7 +233,7 @@ impl Trial<'_> {
         columns: &Columns,
         (spans, length): (&[RunSpan], f64),
         with_covariance: bool,
-    ) -> Result<Option<Fitted>, AxisError> {
+    ) -> Result<Option<WindowFit>, AxisError> {
         if (self.stop)() {
             return Err(AxisError::Stopped);
         }
@@ -270,8 +270,8 @@ impl Trial<'_> {
         model: &AugmentedModel,
         lengths: &[f64],
         tried: &mut Vec<TriedAxis>,
-    ) -> Result<Chosen, AxisError> {
-        let mut best: Option<Chosen> = None;
+    ) -> Result<WindowChoice, AxisError> {
+        let mut best: Option<WindowChoice> = None;
         let mut near = model.clone();
         for length in lengths {
             let Some(found) = self.tried((model, &near), (*length, None), tried)? else {
@@ -293,7 +293,7 @@ impl Trial<'_> {
         models: (&AugmentedModel, &AugmentedModel),
         (length, effect): (f64, Option<&'static str>),
         tried: &mut Vec<TriedAxis>,
-    ) -> Result<Option<Chosen>, AxisError> {
+    ) -> Result<Option<WindowChoice>, AxisError> {
         let found = self.held_out(models, length)?;
         let at = tried.len();
         tried.push(TriedAxis {
@@ -302,7 +302,7 @@ impl Trial<'_> {
             held_out: found.as_ref().map(|(error, _)| *error),
             taken: false,
         });
-        Ok(found.map(|(error, near)| Chosen {
+        Ok(found.map(|(error, near)| WindowChoice {
             error,
             length,
             near,
@@ -317,12 +317,12 @@ impl Trial<'_> {
             entry.friction
                 && entry.families.contains(&Family::Velocity)
                 && entry.role == Role::Columns
-                && entry.search != Search::Orders
+                && entry.search != ShapeSearch::Orders
                 && law.memory.is_none()
                 && law.varied.is_none()
                 && !model.effects.iter().any(|e| e.name() == entry.name)
         };
-        let place = Place::Joint(0);
+        let place = EffectPlace::Joint(0);
         let laws = LAWS.iter().filter(of_speed).filter(|law| {
             let places = law.places(&model.model.robot, &model.model.friction);
             places.contains(&place)
@@ -332,7 +332,8 @@ impl Trial<'_> {
             let with = starts.into_iter().map(|shape| {
                 let mut with = model.clone();
                 let linear = vec![0.0; law.linear.len()];
-                with.effects.push(Added::new(law, place, shape, linear));
+                with.effects
+                    .push(ModelEffect::new(law, place, shape, linear));
                 let left = self.columns(&with).left;
                 (with, left)
             });

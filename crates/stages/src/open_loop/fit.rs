@@ -8,10 +8,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::abreast::Abreast;
+use super::abreast::ParallelWindows;
 use super::numbers::{Columns, numbers, with_numbers};
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::math::descent::{Ending, StepControl, Trial, descend};
+use cft_ident_core::math::descent::{IterationEnding, StepControl, Trial, descend};
 use cft_ident_core::math::long_run::long_run;
 use cft_ident_core::math::rank_revealing::RankRevealingInverse;
 use cft_ident_core::motion::Stretch;
@@ -81,7 +81,7 @@ fn side_by_side(
     let every = every(0, size, positions);
     let parts = (stretch.dt / STEP_S).ceil().max(1.0);
     let begins = windows.iter().map(|w| w.1);
-    let mut abreast = Abreast::begin(model, stretch, begins.clone(), stretch.dt / parts);
+    let mut abreast = ParallelWindows::begin(model, stretch, begins.clone(), stretch.dt / parts);
     let (q, tau) = (&stretch.q[0], &stretch.tau[0]);
     let mut now = vec![0.0; windows.len()];
     let kept = (size - 1) / every + 1;
@@ -114,18 +114,20 @@ pub(super) fn rms(e: &[f64]) -> f64 {
     (e.iter().map(|e| e * e).sum::<f64>() / e.len().max(1) as f64).sqrt()
 }
 
+/// A model that was fitted to rolled-out windows.
 #[derive(Debug, Clone)]
-pub(super) struct Fitted {
+pub(super) struct WindowFit {
     pub model: AugmentedModel,
     /// Root mean square of the positions' errors \[m or rad\].
     pub rms: f64,
-    pub ending: Ending,
+    pub ending: IterationEnding,
     pub steps: usize,
     /// Of all numbers, where it is wanted; zero rows of what was not moved.
     pub covariance: DMatrix<f64>,
 }
 
-struct At {
+/// A point of the iteration: unknowns, errors there, and their slopes.
+struct FitPoint {
     x: Vec<f64>,
     errors: DVector<f64>,
     slopes: DMatrix<f64>,
@@ -138,7 +140,7 @@ pub(super) fn fit(
     windows: &[RunSpan],
     columns: &Columns,
     with_covariance: bool,
-) -> Option<Fitted> {
+) -> Option<WindowFit> {
     let along = |x: &[f64]| errors(&with_numbers(start, x), stretches, windows, POSITIONS);
     let free = &columns.free;
     let slopes = |x: &[f64], at: &DVector<f64>, both: bool| -> Option<DMatrix<f64>> {
@@ -159,12 +161,12 @@ pub(super) fn fit(
     };
     let point = |x: Vec<f64>, errors: DVector<f64>| {
         let slopes = slopes(&x, &errors, false)?;
-        Some(At { x, errors, slopes })
+        Some(FitPoint { x, errors, slopes })
     };
     let x = numbers(start);
     let begun = DVector::from_vec(along(&x)?);
     let begun = point(x, begun)?;
-    let found = descend(begun, &DAMPING, MAX_STEPS, &mut |at: &At, damping| {
+    let found = descend(begun, &DAMPING, MAX_STEPS, &mut |at: &FitPoint, damping| {
         let mut normal = at.slopes.tr_mul(&at.slopes);
         let target = at.slopes.tr_mul(&at.errors);
         for i in 0..free.len() {
@@ -187,7 +189,7 @@ pub(super) fn fit(
         if gain < MIN_COST_DECREASE * before {
             // nearly those of the point before, and nothing moves by them any more
             let slopes = at.slopes.clone();
-            return Ok(Trial::Last(At { x, errors, slopes }));
+            return Ok(Trial::Last(FitPoint { x, errors, slopes }));
         }
         Ok(point(x, errors).map_or(Trial::Rejected, Trial::Accepted))
     });
@@ -198,7 +200,7 @@ pub(super) fn fit(
         at.slopes = slopes(&at.x, &at.errors, true)?;
         of_all = covariance(&at, stretches, windows, free);
     }
-    Some(Fitted {
+    Some(WindowFit {
         rms: rms(at.errors.as_slice()),
         model: with_numbers(start, &at.x),
         ending,
@@ -218,7 +220,12 @@ pub(super) fn apart(windows: &[RunSpan], stretches: &[Stretch], length_s: f64) -
 }
 
 /// Covariance of the numbers by the sum of the windows' scores.
-fn covariance(at: &At, stretches: &[Stretch], windows: &[RunSpan], free: &[usize]) -> DMatrix<f64> {
+fn covariance(
+    at: &FitPoint,
+    stretches: &[Stretch],
+    windows: &[RunSpan],
+    free: &[usize],
+) -> DMatrix<f64> {
     let normal = at.slopes.tr_mul(&at.slopes);
     let inverse = RankRevealingInverse::of(&normal);
     let mut first = 0;

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fit::RunSpan;
-use super::windows::Follower;
+use super::windows::TorqueFollower;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::deviation::NORMAL_95;
@@ -88,7 +88,7 @@ impl FreeRun {
 
 /// One joint in one window.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct FreeRunSums {
     square: f64,
     moved: f64,
     samples: f64,
@@ -96,7 +96,7 @@ struct Sums {
     at: [f64; SHARES.len()],
 }
 
-impl Sums {
+impl FreeRunSums {
     fn rms(&self) -> f64 {
         (self.square / self.samples).sqrt()
     }
@@ -114,15 +114,15 @@ pub fn free_run(
         return None;
     }
     let models: Vec<&AugmentedModel> = std::iter::once(given).chain(after).collect();
-    let each = |window: &RunSpan| -> Option<Vec<Vec<Sums>>> {
+    let each = |window: &RunSpan| -> Option<Vec<Vec<FreeRunSums>>> {
         let of = |model: &&AugmentedModel| one(model, &stretches[window.0], *window);
         models.iter().map(of).collect()
     };
-    let found: Vec<Option<Vec<Vec<Sums>>>> = windows.par_iter().map(each).collect();
-    let kept: Vec<&Vec<Vec<Sums>>> = found.iter().flatten().collect();
+    let found: Vec<Option<Vec<Vec<FreeRunSums>>>> = windows.par_iter().map(each).collect();
+    let kept: Vec<&Vec<Vec<FreeRunSums>>> = found.iter().flatten().collect();
     let robot = &given.model.robot;
     let joints = robot.joint_names().iter().enumerate().map(|(j, joint)| {
-        let of = |model: usize| -> Vec<Sums> { kept.iter().map(|w| w[model][j]).collect() };
+        let of = |model: usize| -> Vec<FreeRunSums> { kept.iter().map(|w| w[model][j]).collect() };
         let (before, then) = (of(0), after.map(|_| of(1)));
         JointFreeRun {
             joint: joint.clone(),
@@ -157,11 +157,15 @@ fn windows(stretches: &[Stretch], spans: &[RunSpan]) -> Vec<RunSpan> {
 }
 
 /// Errors of every joint in one window; none where the motion goes astray.
-fn one(model: &AugmentedModel, stretch: &Stretch, (_, begin, end): RunSpan) -> Option<Vec<Sums>> {
-    let mut sums = vec![Sums::default(); stretch.tau.len()];
+fn one(
+    model: &AugmentedModel,
+    stretch: &Stretch,
+    (_, begin, end): RunSpan,
+) -> Option<Vec<FreeRunSums>> {
+    let mut sums = vec![FreeRunSums::default(); stretch.tau.len()];
     let looked: [usize; SHARES.len()] =
         SHARES.map(|share| begin + (share * (end - 1 - begin) as f64).round() as usize);
-    let mut follower = Follower::new(model, stretch, STEP_S);
+    let mut follower = TorqueFollower::new(model, stretch, STEP_S);
     let follows = follower.run((begin, end), &mut |k, found| {
         for (j, s) in sums.iter_mut().enumerate() {
             let q = &stretch.q[j];
@@ -180,8 +184,8 @@ fn one(model: &AugmentedModel, stretch: &Stretch, (_, begin, end): RunSpan) -> O
     (follows && finite).then_some(sums)
 }
 
-fn error(windows: &[Sums]) -> PositionError {
-    let sum = |of: fn(&Sums) -> f64| windows.iter().map(of).sum::<f64>();
+fn error(windows: &[FreeRunSums]) -> PositionError {
+    let sum = |of: fn(&FreeRunSums) -> f64| windows.iter().map(of).sum::<f64>();
     let square = sum(|s| s.square);
     let growth = SHARES.iter().enumerate().map(|(i, share)| {
         let at: f64 = windows.iter().map(|s| s.at[i]).sum();
@@ -198,7 +202,7 @@ fn error(windows: &[Sums]) -> PositionError {
 }
 
 /// Mean change of a window's rms, window by window.
-fn change(before: &[Sums], after: &[Sums]) -> Option<PositionErrorChange> {
+fn change(before: &[FreeRunSums], after: &[FreeRunSums]) -> Option<PositionErrorChange> {
     let pairs = before.iter().zip(after);
     let changes: Vec<f64> = pairs.map(|(a, b)| b.rms() - a.rms()).collect();
     let n = changes.len() as f64;

@@ -2,19 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use cft_ident_core::effect::{AugmentedModel, Sampled};
+use cft_ident_core::effect::{AugmentedModel, SampledModel};
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::dynamics::Dynamics;
+use cft_ident_core::robot::dynamics::RobotDynamics;
 use cft_ident_core::robot::model::JointFriction;
 
 /// Sweeps over the joints in which impulses of friction settle.
 const SWEEPS: usize = 50;
 
 /// A model in motion.
-pub struct Stepper {
+pub struct ModelStepper {
     model: AugmentedModel,
-    effects: Sampled,
-    dynamics: Dynamics,
+    effects: SampledModel,
+    dynamics: RobotDynamics,
     dt: f64,
     /// Joints whose friction jumps at rest and is held there by it.
     jumps: Vec<bool>,
@@ -31,7 +31,7 @@ pub struct Stepper {
     change: Vec<f64>,
 }
 
-impl Stepper {
+impl ModelStepper {
     /// For steps of `dt` seconds.
     pub fn new(model: &AugmentedModel, dt: f64) -> Self {
         let n = model.model.robot.joints();
@@ -40,8 +40,8 @@ impl Stepper {
             at.any(|e| e.law.memory.is_some())
         };
         let laws = model.model.friction.iter().enumerate();
-        Stepper {
-            effects: Sampled::new(model.clone(), dt),
+        ModelStepper {
+            effects: SampledModel::new(model.clone(), dt),
             dynamics: model.model.robot.dynamics(&model.model.theta),
             dt,
             // what remembers has a friction of its own at rest
@@ -150,7 +150,7 @@ impl Stepper {
 }
 
 /// The friction of a joint in one step.
-pub(super) struct Held {
+pub(super) struct StepFriction {
     pub torque: f64,
     pub slope: f64,
     /// Greatest impulse of friction that jumps.
@@ -159,7 +159,7 @@ pub(super) struct Held {
 
 /// That of a law at a speed; `jumps` says that it holds the joint at rest.
 #[inline]
-pub(super) fn held(law: &JointFriction, jumps: bool, v: f64, dt: f64) -> Held {
+pub(super) fn held(law: &JointFriction, jumps: bool, v: f64, dt: f64) -> StepFriction {
     let (torque, slope) = match law {
         JointFriction::None => (0.0, 0.0),
         JointFriction::DoubleTanh(law) => (law.torque(v), law.slope(v).max(0.0)),
@@ -173,7 +173,7 @@ pub(super) fn held(law: &JointFriction, jumps: bool, v: f64, dt: f64) -> Held {
         JointFriction::ViscousCoulomb(law) if jumps => law.coulomb.max(0.0) * dt,
         _ => 0.0,
     };
-    Held {
+    StepFriction {
         torque,
         slope,
         limit,
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn a_mass_that_slides_stops_where_its_friction_says_and_stays() {
         // 2 kg at 1 m/s against 4 N: 0.5 s and 0.25 m; 3.9 N do not move it after
-        let mut stepper = Stepper::new(&mass(0.0, 4.0), 1e-3);
+        let mut stepper = ModelStepper::new(&mass(0.0, 4.0), 1e-3);
         stepper.begin(&[0.0], &[1.0]);
         for k in 0..2000 {
             let tau = if k < 600 { 0.0 } else { 3.9 };
@@ -217,7 +217,7 @@ mod tests {
     fn a_driven_mass_moves_as_the_closed_solution_says() {
         // m v' = u - b v - c from rest
         let (b, c, u) = (3.0, 1.0, 7.0);
-        let mut stepper = Stepper::new(&mass(b, c), 1e-4);
+        let mut stepper = ModelStepper::new(&mass(b, c), 1e-4);
         stepper.begin(&[0.0], &[0.0]);
         for k in 0..10_000 {
             assert!(stepper.step(f64::from(k) * 1e-4, &[u]));

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::stepper::Stepper;
+use super::stepper::ModelStepper;
 use cft_ident_core::effect::{AugmentedModel, shifted};
 use cft_ident_core::motion::Stretch;
 
@@ -48,8 +48,9 @@ pub struct OpenLoop {
     pub joints: Vec<JointDrift>,
 }
 
+/// Sums of the squares of one joint over windows.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct WindowSums {
     square: f64,
     moved: f64,
     samples: u64,
@@ -61,7 +62,7 @@ struct Sums {
 /// Simulates stretches of logs window after window.
 pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength) -> OpenLoop {
     let robot = &model.model.robot;
-    let mut sums = vec![Sums::default(); robot.joints()];
+    let mut sums = vec![WindowSums::default(); robot.joints()];
     let (mut windows, mut astray) = (0, 0);
     for stretch in stretches {
         let size = match length {
@@ -71,7 +72,7 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
         if size < MIN_WINDOW_SAMPLES {
             continue;
         }
-        let mut follower = Follower::new(model, stretch, STEP_S);
+        let mut follower = TorqueFollower::new(model, stretch, STEP_S);
         // the last sample of a window is the first of the next
         let begins = (0..).step_by(size - 1);
         for begin in begins.take_while(|begin| begin + size <= stretch.len()) {
@@ -116,8 +117,8 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
 }
 
 /// A model that follows the torques of a stretch.
-pub(super) struct Follower<'a> {
-    stepper: Stepper,
+pub(super) struct TorqueFollower<'a> {
+    stepper: ModelStepper,
     stretch: &'a Stretch,
     /// Torques where they move the model: one that comes late is logged later.
     tau: Vec<Vec<f64>>,
@@ -125,7 +126,7 @@ pub(super) struct Follower<'a> {
     parts: f64,
 }
 
-impl<'a> Follower<'a> {
+impl<'a> TorqueFollower<'a> {
     /// By steps of at most so many seconds.
     pub fn new(model: &AugmentedModel, stretch: &'a Stretch, step_s: f64) -> Self {
         let mut tau = stretch.tau.clone();
@@ -134,7 +135,7 @@ impl<'a> Follower<'a> {
         }
         let parts = (stretch.dt / step_s).ceil().max(1.0);
         Self {
-            stepper: Stepper::new(model, stretch.dt / parts),
+            stepper: ModelStepper::new(model, stretch.dt / parts),
             stretch,
             tau,
             parts,

@@ -1,9 +1,9 @@
 //! One effect along logs: the residual of the model that is fitted without it over the signal on which it depends, and
 //! what the model with it explains of that.
 
-use super::Replay;
+use super::LogReplay;
 use cft_ident_core::effect::empirical::ways;
-use cft_ident_core::effect::{Added, AugmentedModel, CurveSignal, Family, Role, Search};
+use cft_ident_core::effect::{AugmentedModel, CurveSignal, Family, ModelEffect, Role, ShapeSearch};
 use cft_ident_core::motion::{MotionError, Stretch};
 use cft_ident_core::robot::JointKind;
 
@@ -24,7 +24,7 @@ pub struct EffectRows {
 }
 
 pub(super) fn effect(
-    replay: &Replay,
+    replay: &LogReplay,
     (model, without): (&AugmentedModel, &AugmentedModel),
     at: usize,
     logs: &[usize],
@@ -53,7 +53,7 @@ pub(super) fn effect(
 
 /// The rows of an effect: at its joint, or where it adds the most.
 fn rows(
-    replay: &Replay,
+    replay: &LogReplay,
     (model, without): (&AugmentedModel, &AugmentedModel),
     at: usize,
     logs: &[usize],
@@ -108,7 +108,7 @@ fn keep_near(rows: &mut Vec<[f64; 3]>) {
 }
 
 /// Whether the torque of an effect flips with the direction of motion, over a signal that does not.
-fn flips(effect: &Added) -> bool {
+fn flips(effect: &ModelEffect) -> bool {
     effect.law.entry.friction && matches!(effect.family(), Family::Load | Family::Position)
 }
 
@@ -130,8 +130,8 @@ enum OfSignal {
 }
 
 impl OfSignal {
-    fn of(effect: &Added, joint: usize) -> Self {
-        let wave = (effect.law.entry.search == Search::Orders).then(|| effect.shape.first());
+    fn of(effect: &ModelEffect, joint: usize) -> Self {
+        let wave = (effect.law.entry.search == ShapeSearch::Orders).then(|| effect.shape.first());
         if let Some(order) = wave.flatten().filter(|order| **order > 0.0) {
             return OfSignal::Wave(1.0 / order);
         }
@@ -147,7 +147,7 @@ impl OfSignal {
         }
     }
 
-    fn named(self, replay: &Replay, effect: &Added, joint: usize) -> (String, String) {
+    fn named(self, replay: &LogReplay, effect: &ModelEffect, joint: usize) -> (String, String) {
         let robot = &replay.machine.robot;
         let unit = |j: usize| robot.joint_kind(j).position_unit();
         let torque = replay.machine.file.torque_unit(joint);
@@ -183,7 +183,7 @@ impl OfSignal {
     fn along(
         self,
         model: &AugmentedModel,
-        (effect, s): (&Added, &Stretch),
+        (effect, s): (&ModelEffect, &Stretch),
         bare: &[Vec<f64>],
         joint: usize,
     ) -> Vec<f64> {

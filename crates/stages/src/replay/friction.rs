@@ -1,8 +1,8 @@
 //! Friction of a model, with everything that was found, beside what was measured.
 
-use super::Replay;
+use super::LogReplay;
 use crate::input::curve::friction_curve;
-use cft_ident_core::effect::{Added, AugmentedModel};
+use cft_ident_core::effect::{AugmentedModel, ModelEffect};
 use cft_ident_core::friction::joint_estimate::FrictionCurvePoint;
 use cft_ident_core::motion::MotionError;
 use cft_ident_core::robot::model::JointFriction;
@@ -27,7 +27,7 @@ pub struct FrictionRows {
 
 /// The friction of every joint that has any, over the rows of all logs.
 pub(super) fn friction(
-    replay: &Replay,
+    replay: &LogReplay,
     file: &ModelFile,
     model: &AugmentedModel,
 ) -> Result<Vec<FrictionRows>, MotionError> {
@@ -54,7 +54,7 @@ pub(super) fn friction(
     Ok(joints.filter_map(of_joint).collect())
 }
 
-fn is_friction(effect: &Added) -> bool {
+fn is_friction(effect: &ModelEffect) -> bool {
     effect.law.entry.friction
 }
 
@@ -66,7 +66,7 @@ pub fn is_beyond_curve(model: &AugmentedModel, joint: usize) -> bool {
 
 /// Velocity, measured torque less all that is no friction, and friction of the model, row by row of every joint.
 pub(super) fn friction_rows(
-    replay: &Replay,
+    replay: &LogReplay,
     model: &AugmentedModel,
 ) -> Result<Vec<Vec<[f64; 3]>>, MotionError> {
     let mut bare = model.clone();

@@ -9,7 +9,7 @@ mod torque;
 
 pub use effect::EffectRows;
 pub use friction::{FrictionRows, is_beyond_curve, speeds};
-pub use poses::Poses;
+pub use poses::TreePoses;
 pub use residual::{ResidualEvidence, ResidualPair};
 pub use torque::{JointSeries, TorqueSeries};
 
@@ -23,7 +23,7 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::escape;
 
 /// Logs with the processing of a robot.
-pub struct Replay<'a> {
+pub struct LogReplay<'a> {
     pub(crate) machine: &'a LoggedRobot,
     stretches: &'a [Stretch],
     /// Names of the logs, by the index that their stretches carry.
@@ -32,7 +32,7 @@ pub struct Replay<'a> {
     cutoff_hz: f64,
 }
 
-impl<'a> Replay<'a> {
+impl<'a> LogReplay<'a> {
     /// The logs that were read for `machine`, and their names.
     ///
     /// # Errors
@@ -44,7 +44,7 @@ impl<'a> Replay<'a> {
     ) -> Result<Self, MotionError> {
         let settings = machine.settings();
         let filters = ParallelFilters::design(&settings, &in_memory.stretches)?;
-        Ok(Replay {
+        Ok(LogReplay {
             machine,
             stretches: &in_memory.stretches,
             names: logs.map(|name| escape(&name)).collect(),
@@ -81,24 +81,24 @@ impl<'a> Replay<'a> {
 
 /// What logs show beside one model.
 #[derive(Debug, Clone)]
-pub struct Replayed {
+pub struct ReplayedLogs {
     /// Names of the logs.
     pub logs: Vec<String>,
     pub friction: Vec<FrictionRows>,
     pub torque: Vec<TorqueSeries>,
     pub residual: ResidualEvidence,
     /// None for a robot whose links are not known.
-    pub poses: Option<Poses>,
+    pub poses: Option<TreePoses>,
 }
 
-impl Replayed {
+impl ReplayedLogs {
     /// Along all logs; residual and poses are those of logs that were not `used` for the model, where some were
     /// and others were not, and the torques of these come first.
     ///
     /// # Errors
     /// Stretches that are too short for the filter.
     pub fn new(
-        replay: &Replay,
+        replay: &LogReplay,
         file: &ModelFile,
         model: &AugmentedModel,
         used: &[bool],
@@ -107,7 +107,7 @@ impl Replayed {
         let (seen, unseen): (Vec<_>, Vec<_>) = replay.all().into_iter().partition(is_used);
         let judged = if unseen.is_empty() { &seen } else { &unseen };
         let ordered: Vec<usize> = unseen.iter().chain(&seen).copied().collect();
-        Ok(Replayed {
+        Ok(ReplayedLogs {
             logs: replay.names.clone(),
             friction: friction::friction(replay, file, model)?,
             torque: torque::torque(replay, &ordered, &[model])?,
@@ -132,7 +132,7 @@ pub struct ReplayedDiagnosis {
     /// Of the model that was found, along all logs.
     pub friction: Vec<FrictionRows>,
     pub residual: ResidualEvidence,
-    pub poses: Option<Poses>,
+    pub poses: Option<TreePoses>,
 }
 
 impl ReplayedDiagnosis {
@@ -145,7 +145,7 @@ impl ReplayedDiagnosis {
         found: &Diagnosed,
         refined: &ModelFile,
     ) -> Result<Self, MotionError> {
-        let replay = Replay::new(machine, &found.in_memory, found.logs.iter().cloned())?;
+        let replay = LogReplay::new(machine, &found.in_memory, found.logs.iter().cloned())?;
         let d = &found.diagnosis;
         let all = replay.all();
         let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
@@ -185,7 +185,7 @@ impl ReplayedPair {
     ///
     /// # Errors
     /// Stretches that are too short for the filter.
-    pub fn new(replay: &Replay, of: &Compared) -> Result<Self, MotionError> {
+    pub fn new(replay: &LogReplay, of: &Compared) -> Result<Self, MotionError> {
         let models = [0, 1].map(|k| &of.sides[k].model);
         let [a, b] = models.map(|model| match model.effects.is_empty() {
             true => Ok(None),

@@ -1,6 +1,6 @@
 //! The robot along its motion, as points of its links.
 
-use super::Replay;
+use super::LogReplay;
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::tree::pose::{driven, origins};
 use cft_ident_core::robot::tree::space::{Vector, cross, dot, times};
@@ -11,7 +11,7 @@ const WAY: usize = 200;
 
 /// Poses of a tree of links, in a frame whose third axis points upwards.
 #[derive(Debug, Clone)]
-pub struct Poses {
+pub struct TreePoses {
     /// Names of the logs.
     pub logs: Vec<String>,
     /// Place of each joint among the points of a pose.
@@ -25,7 +25,7 @@ pub struct Poses {
 }
 
 /// Poses along some logs; none for a robot whose links are not known.
-pub(super) fn poses(replay: &Replay, logs: &[usize]) -> Option<Poses> {
+pub(super) fn poses(replay: &LogReplay, logs: &[usize]) -> Option<TreePoses> {
     let robot = &replay.machine.robot;
     let tree = robot.tree();
     if !robot.knows_links() {
@@ -59,7 +59,7 @@ pub(super) fn poses(replay: &Replay, logs: &[usize]) -> Option<Poses> {
     let turned = |p: &Vector| -> Vector { std::array::from_fn(|i| dot(&axes[i], p)) };
     poses.iter_mut().flatten().for_each(|p| *p = turned(p));
     way.iter_mut().for_each(|p| *p = turned(p));
-    Some(Poses {
+    Some(TreePoses {
         logs: replay.named(logs),
         driven: driven(tree),
         parents: tree.links().iter().map(|link| link.parent).collect(),

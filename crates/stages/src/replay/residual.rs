@@ -1,8 +1,8 @@
 //! What the residual depends on, and the waves that a model has.
 
-use super::Replay;
+use super::LogReplay;
 use cft_ident_core::diagnose::{JointEvidence, evidence, one_after_the_other};
-use cft_ident_core::effect::{AugmentedModel, Place, Search};
+use cft_ident_core::effect::{AugmentedModel, EffectPlace, ShapeSearch};
 use cft_ident_core::motion::{MotionError, Stretch};
 
 /// The residual of one joint.
@@ -27,7 +27,7 @@ pub struct ResidualEvidence {
 
 /// The residual of the first model, and of the second where there is one, along some logs.
 pub(super) fn residual(
-    replay: &Replay,
+    replay: &LogReplay,
     logs: &[usize],
     before: &AugmentedModel,
     after: Option<&AugmentedModel>,
@@ -59,7 +59,7 @@ pub(super) fn residual(
 }
 
 /// Where logs begin on the axis of time; nothing of a single one.
-fn begins(replay: &Replay, stretches: &[&Stretch]) -> Vec<(f64, String)> {
+fn begins(replay: &LogReplay, stretches: &[&Stretch]) -> Vec<(f64, String)> {
     let mut found = Vec::new();
     let mut log = None;
     for (stretch, late) in stretches.iter().zip(one_after_the_other(stretches)) {
@@ -76,7 +76,7 @@ fn begins(replay: &Replay, stretches: &[&Stretch]) -> Vec<(f64, String)> {
 /// Orders of the waves that a model has at a joint.
 fn orders(model: &AugmentedModel, joint: usize) -> Vec<f64> {
     let effects = model.effects.iter();
-    let waves = effects.filter(|e| e.law.entry.search == Search::Orders);
-    let here = waves.filter(|e| e.place == Place::Joint(joint));
+    let waves = effects.filter(|e| e.law.entry.search == ShapeSearch::Orders);
+    let here = waves.filter(|e| e.place == EffectPlace::Joint(joint));
     here.filter_map(|e| e.shape.first().copied()).collect()
 }

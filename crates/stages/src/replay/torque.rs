@@ -1,6 +1,6 @@
 //! Measured and reconstructed torque over time.
 
-use super::Replay;
+use super::LogReplay;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::MotionError;
 
@@ -31,7 +31,7 @@ pub struct TorqueSeries {
 
 /// The torques of `logs`, each as it was filtered, which the errors are of, and as it was logged.
 pub(super) fn torque(
-    replay: &Replay,
+    replay: &LogReplay,
     logs: &[usize],
     models: &[&AugmentedModel],
 ) -> Result<Vec<TorqueSeries>, MotionError> {
@@ -69,7 +69,7 @@ struct Series {
 }
 
 impl Series {
-    fn new(replay: &Replay, models: usize) -> Self {
+    fn new(replay: &LogReplay, models: usize) -> Self {
         let joints = replay.machine.robot.joints();
         Series {
             joints,

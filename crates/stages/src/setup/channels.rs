@@ -207,7 +207,7 @@ impl Channels {
 mod tests {
     use super::*;
     use crate::setup::{Change, ChannelKind};
-    use cft_ident_core::robot::cft::{Setup, Structure};
+    use cft_ident_core::robot::cft::{LaboratorySetup, ParameterStructure};
 
     const ROW: [[f64; 4]; 4] = [
         [0.35, 0.2, 0.9, 0.8],
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn rows_are_as_declared_without_a_correction_and_motors_turn_joints_together() {
-        let robot = Robot::cft(Setup::default(), Structure::Printed12);
+        let robot = Robot::cft(LaboratorySetup::default(), ParameterStructure::Printed12);
         let mut r = DMatrix::from_diagonal(&DVector::from_vec(vec![2.0, 3.0, 1.0, 1.0]));
         r[(3, 2)] = 0.5;
         let gears = Drive::Gears(r.clone(), r.try_inverse().unwrap());

@@ -6,7 +6,7 @@ use super::LIMITS;
 use super::channels::Carried;
 use super::problem::Problem;
 use super::trial::Trial;
-use cft_ident_core::inertia::columns::Own;
+use cft_ident_core::inertia::columns::JointTerm;
 use cft_ident_core::judge::{NUMBERS, PARTS};
 
 /// A joint whose friction drives it, whichever block is left out.
@@ -78,12 +78,12 @@ fn friction_power(problem: &Problem, trial: &Trial, joint: usize) -> Option<DVec
     let own = &problem.columns.own[joint];
     let first = problem.first_own(&trial.robot, joint);
     let sums = &trial.total[joint];
-    let column = |of: Own| {
+    let column = |of: JointTerm| {
         let at = own.iter().position(|o| *o == of)?;
         Some(sums.nrows() - 1 - own.len() + at)
     };
-    let speed = column(Own::Viscous)?;
-    if let (Some(one), Some(sign)) = (column(Own::Offset), column(Own::Coulomb)) {
+    let speed = column(JointTerm::Viscous)?;
+    if let (Some(one), Some(sign)) = (column(JointTerm::Offset), column(JointTerm::Coulomb)) {
         // the way there and back, and what of it is left
         let (way, net) = (sums[(speed, sign)], sums[(speed, one)]);
         if net.abs() > (1.0 - 2.0 * LIMITS.same) * way {
@@ -91,7 +91,11 @@ fn friction_power(problem: &Problem, trial: &Trial, joint: usize) -> Option<DVec
         }
     }
     let mut out = DVector::zeros(trial.theta.len());
-    for (i, of) in own.iter().enumerate().filter(|(_, of)| **of != Own::Offset) {
+    for (i, of) in own
+        .iter()
+        .enumerate()
+        .filter(|(_, of)| **of != JointTerm::Offset)
+    {
         out[first + i] = sums[(speed, column(*of)?)] / trial.rows.count as f64;
     }
     Some(out)

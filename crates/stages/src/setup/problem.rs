@@ -8,7 +8,7 @@ use super::LIMITS;
 use super::channels::{Carried, Channels, Drive};
 use super::correction::Correction;
 use super::sample::Sample;
-use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::judge::{Blocks, Bound, PARTS, Term, divide};
 use cft_ident_core::math::gram::{gram, stride};
 use cft_ident_core::robot::Robot;
@@ -335,9 +335,9 @@ fn joints_that_move(sample: &Sample, linked: bool) -> Vec<bool> {
 }
 
 /// The column of a joint's own term in a row.
-fn own_column(own: Own, carried: &Carried, j: usize) -> f64 {
+fn own_column(own: JointTerm, carried: &Carried, j: usize) -> f64 {
     match own {
-        Own::Coulomb => carried.sign[j],
+        JointTerm::Coulomb => carried.sign[j],
         own => own.column(carried.v[j]),
     }
 }

@@ -3,7 +3,7 @@
 use super::LIMITS;
 use super::problem::Problem;
 use super::trial::Trial;
-use cft_ident_core::inertia::columns::Own;
+use cft_ident_core::inertia::columns::JointTerm;
 
 /// What keeps data from telling.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +74,7 @@ fn friction(problem: &Problem, trial: &Trial, j: usize) -> f64 {
     let first = problem.first_own(&trial.robot, j);
     let sums = &trial.total[j];
     let column = sums.nrows() - 1 - own.len();
-    let terms = || (0..own.len()).filter(|i| own[*i] != Own::Offset);
+    let terms = || (0..own.len()).filter(|i| own[*i] != JointTerm::Offset);
     let pairs = terms().flat_map(|a| terms().map(move |b| (a, b)));
     let product =
         |(a, b)| trial.theta[first + a] * trial.theta[first + b] * sums[(column + a, column + b)];

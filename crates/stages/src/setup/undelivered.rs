@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use super::problem::{JointTable, Problem};
 use super::trial::Trial;
 use crate::setup::channels::Drive;
-use cft_ident_core::inertia::columns::Own;
+use cft_ident_core::inertia::columns::JointTerm;
 use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::math::gram::{gram, stride};
 
@@ -67,7 +67,7 @@ pub(super) fn undelivered(problem: &Problem, declared: &Trial) -> Vec<Undelivere
     let missed = moving.filter(|j| errors[*j] > super::LIMITS.sound);
     let limit = |j: usize| {
         let own = &problem.columns.own[j];
-        let coulomb = own.iter().position(|own| *own == Own::Coulomb);
+        let coulomb = own.iter().position(|own| *own == JointTerm::Coulomb);
         let sign = |columns: usize| Some(columns - own.len() + coulomb?);
         of_joint(j, &declared.rows.of_joint(j, sign))
     };

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{arms, drives, formulas};
 use cft_ident::number::{percent, significant, value_and_std};
-use cft_ident::report::usual::{Measured, Over, PUBLISHED, Published};
+use cft_ident::report::usual::{ErrorScope, PUBLISHED, PublishedError, TorqueMeasurement};
 use serde_json::Value;
 
 pub type Rendered = Result<String, String>;
@@ -426,16 +426,16 @@ fn study(study: &Value, chosen: &[&str]) -> Rendered {
 /// Errors of published models.
 fn usual() -> String {
     let error = |value: Option<f64>| value.map_or("-".to_owned(), percent);
-    let line = |row: &Published| {
+    let line = |row: &PublishedError| {
         vec![
             row.machine.to_owned(),
             match row.measured {
-                Measured::Sensors => "joint sensors".to_owned(),
-                Measured::Currents => "motor currents".to_owned(),
+                TorqueMeasurement::Sensors => "joint sensors".to_owned(),
+                TorqueMeasurement::Currents => "motor currents".to_owned(),
             },
             match row.over {
-                Over::All => "all torques".to_owned(),
-                Over::Joints => "rms over joints".to_owned(),
+                ErrorScope::All => "all torques".to_owned(),
+                ErrorScope::Joints => "rms over joints".to_owned(),
             },
             error(row.fitted),
             error(row.unseen),

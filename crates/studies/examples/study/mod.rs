@@ -7,15 +7,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use cft_ident::config::Trajectory;
-use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
-use cft_ident::friction::inputs::Inputs;
+use cft_ident::friction::estimate::{FrictionOptions, JointEstimate, estimate};
+use cft_ident::friction::inputs::FrictionInputs;
 use cft_ident::friction::motions::motions;
-use cft_ident::friction::prepare::{Prepared, SensorModel as Read, prepare};
+use cft_ident::friction::prepare::{PreparedProblem, SensorModel as Read, prepare};
 use cft_ident::identify::narrowed;
 use cft_ident::log::Block;
 use cft_ident::motion::FilterSettings as Processing;
 use cft_ident::robot::Robot;
-use cft_ident::simulate::reference::Fourier;
+use cft_ident::simulate::reference::FourierReference;
 use cft_ident::simulate::{
     Noise, Path as Motion, Reference, ReferenceFrame, Settings, SimulatedRun,
 };
@@ -130,7 +130,7 @@ pub fn noisy(seconds: f64, seed: u64) -> Settings<4> {
 }
 
 /// A Fourier series that comes with the tool.
-pub fn series(file: &str) -> Fourier<4> {
+pub fn series(file: &str) -> FourierReference<4> {
     let Ok(Trajectory::Fourier(file)) = Trajectory::load(Path::new(file)) else {
         panic!("{file} comes with the tool");
     };
@@ -140,8 +140,8 @@ pub fn series(file: &str) -> Fourier<4> {
             .map(|l| std::array::from_fn(|i| columns[i][l]))
             .collect()
     };
-    let usual = Fourier::table_3();
-    Fourier {
+    let usual = FourierReference::table_3();
+    FourierReference {
         offset: std::array::from_fn(|i| file.series[i].offset),
         a: column(&|i| file.series[i].a.clone()),
         b: column(&|i| file.series[i].b.clone()),
@@ -153,7 +153,7 @@ pub fn series(file: &str) -> Fourier<4> {
 }
 
 /// A series in motor coordinates as a reference.
-pub fn along(series: Fourier<4>) -> Reference<4> {
+pub fn along(series: FourierReference<4>) -> Reference<4> {
     Reference {
         frame: ReferenceFrame::Motors,
         path: Motion::Fourier(series),
@@ -168,7 +168,7 @@ pub fn estimated(
     names: &[String],
     log: &Block,
     smoothing: bool,
-) -> (Prepared, JointEstimate) {
+) -> (PreparedProblem, JointEstimate) {
     let found = |settings: &Processing| {
         motions(&log.t, &log.q, &log.tau, 4, settings).expect("a whole log")
     };
@@ -185,14 +185,14 @@ pub fn estimated(
     let wide = found(&processing());
     let narrower = found(&narrowed(&processing(), 1000.0));
     let prepared = prepare(robot, joint, &wide, &sensors).expect("the joint moves");
-    let inputs = Inputs {
+    let inputs = FrictionInputs {
         robot,
         joint,
         motions: &wide,
         narrower: &narrower,
         sensors: &sensors,
     };
-    let options = Options::default();
+    let options = FrictionOptions::default();
     let inputs = smoothing.then_some(&inputs);
     let e = estimate(JOINTS[joint], names, &prepared, inputs, &options).expect("an estimate");
     (prepared, e)

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use cft_ident::config::ModelFile;
 use cft_ident::identify::{
-    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, ValidateSettings, WatchSettings,
-    Watchable, lsq, validate, watch,
+    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, RowSource, ValidateSettings,
+    WatchSettings, lsq, validate, watch,
 };
 use cft_ident::log::LogSpec;
 use cft_ident::motion::FilterSettings;
@@ -156,7 +156,7 @@ impl Scored {
                 per_hour: 60.0,
                 unloaded: &[],
             };
-            let input = Watchable::Log(log.clone());
+            let input = RowSource::Log(log.clone());
             let mut rows: Vec<(f64, Vec<f64>, Vec<f64>)> = Vec::new();
             let found = watch(&given, input, &settings, &control, &mut |line| {
                 for (j, held) in model.held_out.iter().enumerate() {

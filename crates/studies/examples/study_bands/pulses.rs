@@ -49,7 +49,7 @@ pub fn shown(
         block.tau.push(if on { torque(t.max(0.0)) } else { 0.0 });
     }
     let mut out = Vec::new();
-    let mut take = |o: &cft_ident::observe::Observed| {
+    let mut take = |o: &cft_ident::observe::ExternalTorques| {
         if o.t >= -1e-9 {
             out.push(o.external[0]);
         }

@@ -3,7 +3,7 @@
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq};
 use cft_ident::motion::ZeroOrderHold;
-use cft_ident::robot::cft::Setup;
+use cft_ident::robot::cft::LaboratorySetup;
 use cft_ident::simulate::CftTruth;
 use cft_ident::simulate::cft::follow;
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ pub struct Campaign {
 /// A minute of the campaign's motion at phases of its own.
 fn minute(machine: &LoggedRobot, seed: u64) -> Log {
     let motion = series("configs/cft-excitation.toml").at_random_phase(seed);
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let run = follow(&truth, &[], along(motion), &noisy(60.0, seed)).expect("a run");
     let mut block = block(&run);
     ZeroOrderHold::new(4).centre(&machine.robot, &mut block);

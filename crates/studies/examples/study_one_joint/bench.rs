@@ -1,8 +1,8 @@
 //! One-joint logs as laboratories have them, simulated, and the filter's estimate from them.
 
-use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
+use cft_ident::friction::estimate::{FrictionOptions, JointEstimate, estimate};
 use cft_ident::friction::excitation::FrictionError;
-use cft_ident::friction::inputs::Inputs;
+use cft_ident::friction::inputs::FrictionInputs;
 use cft_ident::friction::motions::motions;
 use cft_ident::friction::prepare::{SensorModel, SmoothedMotion, prepare};
 use cft_ident::identify::narrowed;
@@ -12,8 +12,8 @@ use cft_ident::robot::{JointKind, Robot};
 use cft_ident::simulate::reference::{LadderPlan, Path, ReferenceFrame, TURN};
 use cft_ident::simulate::run::run;
 use cft_ident::simulate::{
-    Effects, MotorInput, Noise, Reference, Settings, SimulatedRun, SingleJointTruth,
-    SmoothFriction, Start,
+    MotionStart, MotorInput, Noise, PlantEffects, Reference, Settings, SimulatedRun,
+    SingleJointTruth, SmoothFriction,
 };
 use rand::{RngExt, SeedableRng};
 
@@ -141,8 +141,8 @@ fn ladder(
     settings.sensors.torque_noise = Noise::Relative(0.01);
     run(
         &plant,
-        Effects::default(),
-        &Start::Settled,
+        PlantEffects::default(),
+        &MotionStart::Settled,
         &drive,
         &settings,
     )
@@ -226,7 +226,7 @@ pub fn estimated(case: &Case, seed: u64) -> (Result<JointEstimate, FrictionError
         zero_order_hold: true,
     };
     let prepared = prepare(&robot, 0, &wide, &sensors).expect("the joint moves");
-    let inputs = Inputs {
+    let inputs = FrictionInputs {
         robot: &robot,
         joint: 0,
         motions: &wide,
@@ -234,7 +234,7 @@ pub fn estimated(case: &Case, seed: u64) -> (Result<JointEstimate, FrictionError
         sensors: &sensors,
     };
     let names = ["inertia".to_owned()];
-    let options = Options::default();
+    let options = FrictionOptions::default();
     let found = estimate("wrist", &names, &prepared, Some(&inputs), &options);
     (found, law)
 }

@@ -17,16 +17,16 @@ use std::path::Path;
 use cft_ident::identify::narrowed;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
 use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
-use cft_ident::inertia::solve::{Fit, Weighting, fit};
+use cft_ident::inertia::solve::{Fit, RowWeighting, fit};
 use cft_ident::inertia::{accumulate, add_processing};
 use cft_ident::log::Block;
 use cft_ident::motion::position_cutoff::{CutoffTrial, candidates};
-use cft_ident::motion::{FilterSettings, Parallel, Stretch, ZeroOrderHold, full_rate, rest};
+use cft_ident::motion::{FilterDesign, FilterSettings, Stretch, ZeroOrderHold, full_rate, rest};
 use cft_ident::robot::Robot;
-use cft_ident::robot::cft::{Setup, Structure};
+use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::simulate::cft::follow;
-use cft_ident::simulate::reference::{Fourier, Points};
+use cft_ident::simulate::reference::{FourierReference, SplineReference};
 use cft_ident::simulate::{CftTruth, Path as Motion, Reference, ReferenceFrame, SimulatedRun};
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -49,7 +49,7 @@ fn main() {
     summarise(&rows, &folder);
 }
 
-fn slowed(mut of: Fourier<4>, factor: f64) -> Fourier<4> {
+fn slowed(mut of: FourierReference<4>, factor: f64) -> FourierReference<4> {
     of.fundamental *= factor;
     for x in of.a.iter_mut().chain(&mut of.b).flatten() {
         *x *= factor;
@@ -82,7 +82,7 @@ fn points(seed: u64) -> Reference<4> {
     }
     Reference {
         frame: ReferenceFrame::Motors,
-        path: Motion::Points(Points::new(&list).expect("times increase")),
+        path: Motion::Points(SplineReference::new(&list).expect("times increase")),
     }
 }
 
@@ -151,7 +151,7 @@ impl Driven {
                 channels[4 + j].push(f64::from(self.v[4 * k + j].abs() > self.rest[j]));
             }
         }
-        let parallel = Parallel::design(&FilterSettings::default(), DT).expect("usual filters");
+        let parallel = FilterDesign::design(&FilterSettings::default(), DT).expect("usual filters");
         let views: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
         let rows = parallel.run(&views).expect("a long log");
         let rms = |j: usize| {
@@ -194,7 +194,7 @@ fn fitted(
     settings: &FilterSettings,
 ) -> Fit {
     let found = accumulate(robot, columns, settings, &mut source(log)).expect("a log");
-    fit(&found.0, Weighting::Wls).expect("a fit")
+    fit(&found.0, RowWeighting::Wls).expect("a fit")
 }
 
 /// The fit with the deviations that the tool states.
@@ -212,7 +212,7 @@ fn with_deviations(
             let mut read = source(log);
             let sums = accumulate_shifted(robot, columns, None, settings, grid, &mut read);
             let sums = sums.expect("a log").expect("its encoders are known");
-            fit(&sums, Weighting::Wls).expect("a fit")
+            fit(&sums, RowWeighting::Wls).expect("a fit")
         })
         .collect();
     add_scatter(&mut found, &shifted);
@@ -220,10 +220,10 @@ fn with_deviations(
 }
 
 fn plant(seed: u64) -> Value {
-    let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+    let robot = Robot::cft(LaboratorySetup::Tuedacs, ParameterStructure::Printed12);
     let mut cases = Vec::new();
     for (s, slope) in SLOPES.into_iter().enumerate() {
-        let mut truth = CftTruth::synthetic(Setup::Tuedacs)
+        let mut truth = CftTruth::synthetic(LaboratorySetup::Tuedacs)
             .varied(0.15, seed)
             .expect("a plant");
         for law in &mut truth.friction {

@@ -7,8 +7,10 @@ use rayon::prelude::*;
 
 use super::term::{Factor, FormulaTerm, Function, Source};
 use crate::diagnose::prepared::PreparedCase;
-use crate::diagnose::problem::pass::{Candidate, LANES, Window, in_window, regressor, windows};
-use crate::effect::{AugmentedModel, Scene, shifted};
+use crate::diagnose::problem::pass::{
+    EffectCandidate, LANES, Window, in_window, regressor, windows,
+};
+use crate::effect::{AugmentedModel, EffectScene, shifted};
 use crate::motion::MotionError;
 
 /// What the columns of terms are products of.
@@ -47,7 +49,7 @@ impl Columns {
         self.of.len()
     }
 
-    pub fn series(&self, scene: &Scene) -> Vec<Vec<f64>> {
+    pub fn series(&self, scene: &EffectScene) -> Vec<Vec<f64>> {
         let factors = self.factors.iter().map(|f| f.series(scene));
         let waves = self.waves.iter().map(|(source, n, cosine)| {
             let mut x = Factor::of(Function::Plain, *source).series(scene);
@@ -91,7 +93,7 @@ impl PreparedCase<'_> {
     pub fn joint_rows(
         &self,
         about: &AugmentedModel,
-        candidates: &[Candidate],
+        candidates: &[EffectCandidate],
         terms: &[FormulaTerm],
         j: usize,
     ) -> Result<RowsOfJoint, MotionError> {

@@ -3,19 +3,22 @@
 
 use super::Proposed;
 use super::picture::OnHeldOut;
-use super::term::{FormulaTerm, Names, ShapeNumber, Source, named};
+use super::term::{FormulaTerm, ShapeNumber, Source, TermNames, named};
 use crate::diagnose::candidates::refined_shapes;
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::outcome::{FormulaEnd, FoundEffect, FoundFormula, StepStatus, Symmetry};
+use crate::diagnose::outcome::JudgedEffects;
+use crate::diagnose::outcome::{
+    FormulaEnd, FormulaSymmetry, FoundEffect, FoundFormula, StepStatus,
+};
 use crate::diagnose::prepared::PreparedCase;
 use crate::diagnose::problem::case::formula_name;
-use crate::diagnose::problem::pass::Candidate;
-use crate::diagnose::search::Chosen;
+use crate::diagnose::problem::pass::EffectCandidate;
+use crate::diagnose::search::ChosenCandidate;
 use crate::diagnose::searched::SearchedCase;
-use crate::diagnose::steps::{Judged, judge};
+use crate::diagnose::steps::judge;
 use crate::diagnose::tables::beside_the_others;
-use crate::effect::formula::{Definition, Shape};
-use crate::effect::{Added, Place, own};
+use crate::effect::formula::{FormulaDefinition, FormulaShape};
+use crate::effect::{EffectPlace, ModelEffect, own};
 use crate::judge::Bound;
 use crate::robot::FormulaSignal;
 
@@ -26,7 +29,7 @@ const WAVE: [f64; 2] = [0.95, 1.05];
 /// What was made of a search: formulas, and the outcome with those that the user accepts.
 pub struct SearchedFormulas {
     pub formulas: Vec<FoundFormula>,
-    pub accepted: Option<(SearchedCase, Judged)>,
+    pub accepted: Option<(SearchedCase, JudgedEffects)>,
 }
 
 impl PreparedCase<'_> {
@@ -34,7 +37,7 @@ impl PreparedCase<'_> {
     pub fn judged_formulas(
         &self,
         searched: &SearchedCase,
-        confirmed: &[Chosen],
+        confirmed: &[ChosenCandidate],
         proposed: Vec<Proposed>,
     ) -> Result<SearchedFormulas, DiagnoseError> {
         let all: Vec<&Proposed> = proposed.iter().collect();
@@ -75,14 +78,14 @@ impl PreparedCase<'_> {
     fn with_formulas(
         &self,
         searched: &SearchedCase,
-        confirmed: &[Chosen],
+        confirmed: &[ChosenCandidate],
         taken: &[&Proposed],
-    ) -> Result<(SearchedCase, Judged), DiagnoseError> {
-        let stays = |c: &&Chosen| {
-            let same = |own: &Chosen| own.candidate == c.candidate;
+    ) -> Result<(SearchedCase, JudgedEffects), DiagnoseError> {
+        let stays = |c: &&ChosenCandidate| {
+            let same = |own: &ChosenCandidate| own.candidate == c.candidate;
             taken.iter().all(|p| p.beside.iter().any(same))
         };
-        let mut chosen: Vec<Chosen> = confirmed.iter().filter(stays).cloned().collect();
+        let mut chosen: Vec<ChosenCandidate> = confirmed.iter().filter(stays).cloned().collect();
         let mut candidates = searched.candidates.clone();
         for (i, candidate) in candidates.iter_mut().enumerate() {
             if !chosen.iter().any(|c| c.candidate == i) {
@@ -91,7 +94,7 @@ impl PreparedCase<'_> {
             }
         }
         for p in taken {
-            chosen.push(Chosen {
+            chosen.push(ChosenCandidate {
                 candidate: candidates.len(),
                 gain: p.selected.gain.clone(),
                 error: p.selected.error,
@@ -123,23 +126,23 @@ impl PreparedCase<'_> {
         Ok((case, judged))
     }
 
-    fn candidate(&self, of: &Proposed) -> Result<Candidate, DiagnoseError> {
+    fn candidate(&self, of: &Proposed) -> Result<EffectCandidate, DiagnoseError> {
         let law = own::law(&self.definition(of), &self.case.given.model.robot)?;
         let shapes = named(&of.terms, &self.names(of.joint));
         let shape = shapes.iter().map(|s| s.value).collect();
         let linear = vec![0.0; law.linear.len()];
-        let effect = Added::new(law, Place::Joint(of.joint), shape, linear);
-        Ok(Candidate {
+        let effect = ModelEffect::new(law, EffectPlace::Joint(of.joint), shape, linear);
+        Ok(EffectCandidate {
             bounds: vec![Bound::NONE; law.linear.len()],
             slopes: refined_shapes(&self.fitted.model, self.case, &self.cover, &effect),
             effect,
         })
     }
 
-    pub(super) fn names(&self, joint: usize) -> Names<'_> {
+    pub(super) fn names(&self, joint: usize) -> TermNames<'_> {
         let robot = &self.case.given.model.robot;
         let units = (0..robot.joints()).map(|k| robot.joint_kind(k).position_unit());
-        Names {
+        TermNames {
             joint,
             joints: robot.joint_names(),
             positions: units.collect(),
@@ -148,7 +151,7 @@ impl PreparedCase<'_> {
     }
 
     /// A formula as an effect of the user's own: its name is that of its joint.
-    fn definition(&self, of: &Proposed) -> Definition {
+    fn definition(&self, of: &Proposed) -> FormulaDefinition {
         let names = &self.names(of.joint);
         let shapes = named(&of.terms, names);
         let mut coefficients: Vec<[String; 3]> = Vec::new();
@@ -161,7 +164,7 @@ impl PreparedCase<'_> {
         }
         let joint = &names.joints[of.joint];
         let mut sources = of.terms.iter().flat_map(FormulaTerm::sources);
-        Definition {
+        FormulaDefinition {
             name: self.free_name(&formula_name(joint)),
             joints: Some(vec![joint.clone()]),
             coefficients,
@@ -180,18 +183,19 @@ impl PreparedCase<'_> {
         all.find(|own| !known(own)).unwrap_or_default()
     }
 
-    fn symmetry(&self, of: &Proposed) -> Symmetry {
-        Symmetry::of(&of.terms, &of.selected.squares, of.joint)
+    fn symmetry(&self, of: &Proposed) -> FormulaSymmetry {
+        FormulaSymmetry::of(&of.terms, &of.selected.squares, of.joint)
     }
 
     fn found(
         &self,
         searched: &SearchedCase,
-        confirmed: &[Chosen],
+        confirmed: &[ChosenCandidate],
         of: &Proposed,
         step: FoundEffect,
     ) -> FoundFormula {
-        let stays = |c: &&Chosen| !of.beside.iter().any(|own| own.candidate == c.candidate);
+        let stays =
+            |c: &&ChosenCandidate| !of.beside.iter().any(|own| own.candidate == c.candidate);
         let replaced = confirmed.iter().filter(stays);
         let end = match &step {
             _ if of.p_value > self.case.formula.chance => FormulaEnd::Chance,
@@ -217,12 +221,12 @@ impl PreparedCase<'_> {
     }
 }
 
-fn range(shape: &ShapeNumber) -> Shape {
+fn range(shape: &ShapeNumber) -> FormulaShape {
     let around = match shape.name.starts_with('n') {
         true => WAVE,
         false => AROUND,
     };
-    Shape {
+    FormulaShape {
         name: shape.name.clone(),
         unit: shape.unit.clone(),
         range: around.map(|times| times * shape.value),

@@ -3,8 +3,8 @@
 //! What carries a torque (speed, direction, load, a state that remembers, ..) is multiplied by what sets its size
 //! (positions, load, temperature, what another joint does, ..).
 
-use super::term::{Factor, FormulaTerm, Function, Names, Source};
-use crate::effect::Cover;
+use super::term::{Factor, FormulaTerm, Function, Source, TermNames};
+use crate::effect::LogCoverage;
 use crate::robot::FormulaSignal as Of;
 
 /// Scales of a function over the spread of its signal, and of a state over the travel: refinement finds those between.
@@ -19,10 +19,10 @@ const BY_OTHERS: usize = 6;
 /// A wave goes round at least so often over the travel, or it is a slope.
 const LEAST_WAVES: f64 = 0.25;
 
-/// What a joint and the others did.
-pub struct Around<'a> {
-    pub cover: &'a Cover,
-    pub names: &'a Names<'a>,
+/// What formulas at one joint may use: what that joint and the others did, and their names.
+pub struct FormulaContext<'a> {
+    pub cover: &'a LogCoverage,
+    pub names: &'a TermNames<'a>,
     /// Joints that move in some log.
     pub moving: Vec<usize>,
     /// Joints whose temperature every log has, with its spread.
@@ -30,7 +30,7 @@ pub struct Around<'a> {
 }
 
 /// All terms whose units one constant makes right.
-pub fn library(around: &Around) -> Vec<FormulaTerm> {
+pub fn library(around: &FormulaContext) -> Vec<FormulaTerm> {
     let j = around.names.joint;
     let (carriers, own) = (around.carriers(), around.sizes());
     let others: Vec<FormulaTerm> = around.others().flat_map(|k| around.sizes_of(k)).collect();
@@ -69,7 +69,7 @@ pub fn library(around: &Around) -> Vec<FormulaTerm> {
     kept
 }
 
-impl Around<'_> {
+impl FormulaContext<'_> {
     fn others(&self) -> impl Iterator<Item = usize> + '_ {
         self.moving
             .iter()

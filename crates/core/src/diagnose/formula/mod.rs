@@ -32,38 +32,38 @@ use rayon::prelude::*;
 
 use self::columns::RowsOfJoint;
 use self::judged::SearchedFormulas;
-use self::library::{Around, library};
-use self::select::{Products, Selected, gram};
-use self::term::{FormulaTerm, Names};
+use self::library::{FormulaContext, library};
+use self::select::{SelectedTerms, TermProducts, gram};
+use self::term::{FormulaTerm, TermNames};
 use super::error::DiagnoseError;
 use super::outcome::Diagnosis;
+use super::outcome::JudgedEffects;
 use super::prepared::PreparedCase;
-use super::problem::pass::Candidate;
-use super::search::Chosen;
+use super::problem::pass::EffectCandidate;
+use super::search::ChosenCandidate;
 use super::searched::SearchedCase;
-use super::steps::Judged;
-use super::watch::Watch;
-use crate::effect::{AugmentedModel, Place};
+use super::watch::DiagnosisWatch;
+use crate::effect::{AugmentedModel, EffectPlace};
 use crate::judge::compare;
 
 /// A formula of a joint before the judge.
 pub struct Proposed {
     pub joint: usize,
     pub terms: Vec<FormulaTerm>,
-    pub selected: Selected,
+    pub selected: SelectedTerms,
     /// Chance of a gain as large where whole parts of the residual have another sign.
     pub p_value: f64,
     /// Effects of the catalogue that stay beside it.
-    pub beside: Vec<Chosen>,
+    pub beside: Vec<ChosenCandidate>,
 }
 
 impl PreparedCase<'_> {
     /// Formulas of joints whose residual is above its noise.
     pub(super) fn formulas(
         &self,
-        (searched, judged): (&SearchedCase, &Judged),
+        (searched, judged): (&SearchedCase, &JudgedEffects),
         found: &Diagnosis,
-        watch: Watch,
+        watch: DiagnosisWatch,
     ) -> Result<SearchedFormulas, DiagnoseError> {
         let joints: Vec<usize> = match self.blocks.list.len() >= self.case.numbers.least_blocks {
             true => found.structured_joints().collect(),
@@ -71,7 +71,7 @@ impl PreparedCase<'_> {
         };
         let confirmed = searched.chosen.iter().zip(&judged.steps);
         let confirmed = confirmed.filter(|(_, step)| step.written.is_some());
-        let confirmed: Vec<Chosen> = confirmed.map(|(c, _)| c.clone()).collect();
+        let confirmed: Vec<ChosenCandidate> = confirmed.map(|(c, _)| c.clone()).collect();
         let part = watch.part("formulas", joints.len());
         let mut proposed = Vec::new();
         for j in joints {
@@ -87,7 +87,7 @@ impl PreparedCase<'_> {
     fn proposed(
         &self,
         searched: &SearchedCase,
-        confirmed: &[Chosen],
+        confirmed: &[ChosenCandidate],
         j: usize,
     ) -> Result<Option<Proposed>, DiagnoseError> {
         let of_joint = OfJoint::of(self, searched, confirmed, j);
@@ -106,7 +106,7 @@ impl PreparedCase<'_> {
             let p_value = self.chance(&products, &selected);
             let terms = selected.terms.iter().map(|t| terms[*t].clone()).collect();
             let (terms, selected) = self.reshaped(about, (&of_joint, &kept), (terms, selected))?;
-            let stays = |c: &&Chosen| with_own || !of_joint.is_own(searched, c);
+            let stays = |c: &&ChosenCandidate| with_own || !of_joint.is_own(searched, c);
             Ok(Some(Proposed {
                 joint: j,
                 terms,
@@ -130,7 +130,7 @@ impl PreparedCase<'_> {
         })
     }
 
-    fn selected(&self, products: &Products, signs: Option<&[f64]>) -> Option<Selected> {
+    fn selected(&self, products: &TermProducts, signs: Option<&[f64]>) -> Option<SelectedTerms> {
         let plain = vec![1.0; self.blocks.list.len()];
         let numbers = (&self.case.formula, &self.case.numbers);
         products.select(signs.unwrap_or(&plain), numbers)
@@ -141,9 +141,9 @@ impl PreparedCase<'_> {
         terms: &'t [FormulaTerm],
         rows: (&'t RowsOfJoint, &DMatrix<f64>, &[usize]),
         j: usize,
-    ) -> Option<Products<'t>> {
+    ) -> Option<TermProducts<'t>> {
         let ridge = self.case.numbers.ridge;
-        Products::of(terms, rows, &self.names(j), ridge)
+        TermProducts::of(terms, rows, &self.names(j), ridge)
     }
 
     /// Terms chosen anew of these and of others with shapes near theirs, twice: what made good for a wrong shape falls out.
@@ -151,8 +151,8 @@ impl PreparedCase<'_> {
         &self,
         about: &AugmentedModel,
         (of_joint, kept): (&OfJoint, &[usize]),
-        (mut terms, mut selected): (Vec<FormulaTerm>, Selected),
-    ) -> Result<(Vec<FormulaTerm>, Selected), DiagnoseError> {
+        (mut terms, mut selected): (Vec<FormulaTerm>, SelectedTerms),
+    ) -> Result<(Vec<FormulaTerm>, SelectedTerms), DiagnoseError> {
         let j = of_joint.joint;
         for by in CLOSER {
             let mut near = terms.clone();
@@ -171,7 +171,7 @@ impl PreparedCase<'_> {
         Ok((terms, selected))
     }
 
-    fn around<'b>(&'b self, names: &'b Names<'b>) -> Around<'b> {
+    fn around<'b>(&'b self, names: &'b TermNames<'b>) -> FormulaContext<'b> {
         let stretches = &self.case.stretches;
         let joints = 0..self.cover.joints.len();
         let spread = |k: usize| {
@@ -183,7 +183,7 @@ impl PreparedCase<'_> {
         let known = known.filter(|k| stretches.iter().all(|s| s.has_temperature(*k)));
         let warm = known.map(|k| (k, spread(k)));
         let moves = |k: &usize| !self.cover.joints[*k].stationary;
-        Around {
+        FormulaContext {
             cover: &self.cover,
             names,
             moving: joints.filter(moves).collect(),
@@ -192,7 +192,7 @@ impl PreparedCase<'_> {
     }
 
     /// Chance of a gain as large where whole parts of the residual have another sign, until it is too large to be reported.
-    fn chance(&self, products: &Products, selected: &Selected) -> f64 {
+    fn chance(&self, products: &TermProducts, selected: &SelectedTerms) -> f64 {
         let numbers = &self.case.formula;
         let mut chance = ChaCha8Rng::seed_from_u64(numbers.seed);
         let mut signs = |_| {
@@ -219,7 +219,7 @@ impl PreparedCase<'_> {
 /// What the model has at a joint beside a formula.
 struct OfJoint {
     joint: usize,
-    candidates: Vec<Candidate>,
+    candidates: Vec<EffectCandidate>,
     /// Of each declared column: whether it is of an effect of the joint itself.
     own: Vec<bool>,
 }
@@ -228,14 +228,14 @@ impl OfJoint {
     fn of(
         prepared: &PreparedCase,
         searched: &SearchedCase,
-        confirmed: &[Chosen],
+        confirmed: &[ChosenCandidate],
         joint: usize,
     ) -> Self {
-        let candidate = |c: &Chosen| searched.candidates[c.candidate].clone();
-        let candidates: Vec<Candidate> = confirmed.iter().map(candidate).collect();
+        let candidate = |c: &ChosenCandidate| searched.candidates[c.candidate].clone();
+        let candidates: Vec<EffectCandidate> = confirmed.iter().map(candidate).collect();
         let mut own = vec![false; prepared.unknowns.without_held().columns[joint].len()];
         for candidate in candidates.iter().filter(|c| c.effect.place.touches(joint)) {
-            let is_own = candidate.effect.place == Place::Joint(joint);
+            let is_own = candidate.effect.place == EffectPlace::Joint(joint);
             let count = candidate.bounds.len() + candidate.slopes.len();
             own.extend(std::iter::repeat_n(is_own, count));
         }
@@ -246,8 +246,8 @@ impl OfJoint {
         }
     }
 
-    fn is_own(&self, searched: &SearchedCase, chosen: &Chosen) -> bool {
-        searched.candidates[chosen.candidate].effect.place == Place::Joint(self.joint)
+    fn is_own(&self, searched: &SearchedCase, chosen: &ChosenCandidate) -> bool {
+        searched.candidates[chosen.candidate].effect.place == EffectPlace::Joint(self.joint)
     }
 
     /// Declared columns, with those of the joint's own effects or without.

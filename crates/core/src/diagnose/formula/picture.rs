@@ -6,7 +6,7 @@ use crate::diagnose::prepared::{PreparedCase, filtered};
 use crate::diagnose::problem::data_split::LogRole;
 use crate::diagnose::unexplained::signal::{Signal, values};
 use crate::effect::cover::{TURN, reversals};
-use crate::effect::{AugmentedModel, Torques};
+use crate::effect::{AugmentedModel, StretchTorques};
 use crate::robot::FormulaSignal;
 
 const MOST: usize = 700;
@@ -58,9 +58,12 @@ impl<'a> OnHeldOut<'a> {
         let every = self.rows.len().div_ceil(MOST).max(1);
         let rows: Vec<_> = self.rows.iter().step_by(every).collect();
         let samples: Vec<(usize, usize)> = rows.iter().map(|([s, k], _)| (*s, *k)).collect();
-        let torques: Vec<Torques> = match over {
+        let torques: Vec<StretchTorques> = match over {
             Signal::Load => stretches.iter().map(|s| self.model.torques(s)).collect(),
-            _ => stretches.iter().map(|_| Torques::default()).collect(),
+            _ => stretches
+                .iter()
+                .map(|_| StretchTorques::default())
+                .collect(),
         };
         let x = values(over, self.joint, &samples, stretches, &torques);
         let of_row = |(x, (_, [a, b])): (f64, &([usize; 2], [f64; 2]))| [x, *a, a - b];

@@ -7,12 +7,12 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::columns::RowsOfJoint;
-use super::term::{FormulaTerm, Names};
+use super::term::{FormulaTerm, TermNames};
 use crate::diagnose::problem::formula_numbers::FormulaNumbers;
 use crate::judge::{BlockSums, BlocksLeftOut, Bound, ErrorGain, Numbers, Term, Terms};
 
 /// Terms with sums of products of their columns, the declared ones and the residual.
-pub struct Products<'a> {
+pub struct TermProducts<'a> {
     pub terms: &'a [FormulaTerm],
     columns: Vec<Range<usize>>,
     /// Names and values of the shapes of each.
@@ -37,8 +37,9 @@ struct BlockProducts {
     square: f64,
 }
 
+/// Terms that were chosen, with what they gain and what they leave.
 #[derive(Debug, Clone)]
-pub struct Selected {
+pub struct SelectedTerms {
     pub terms: Vec<usize>,
     pub gain: ErrorGain,
     /// Squared error of blocks left out without any, and of each block with them.
@@ -50,12 +51,12 @@ pub struct Selected {
     pub squares: Vec<f64>,
 }
 
-impl<'a> Products<'a> {
+impl<'a> TermProducts<'a> {
     /// None where the declared columns have no factor.
     pub fn of(
         terms: &'a [FormulaTerm],
         (rows, gram, kept): (&'a RowsOfJoint, &DMatrix<f64>, &[usize]),
-        names: &Names,
+        names: &TermNames,
         ridge: f64,
     ) -> Option<Self> {
         let mut next = 0;
@@ -89,7 +90,7 @@ impl<'a> Products<'a> {
         let through = normal.cholesky()?.solve(&across.transpose());
         let beside = gram - across * &through;
         let part = |c: usize| beside[(c, c)] / gram[(c, c)].max(1e-300);
-        Some(Products {
+        Some(TermProducts {
             terms,
             columns,
             shapes: terms.iter().map(|t| shapes_of(t, names)).collect(),
@@ -106,9 +107,9 @@ impl<'a> Products<'a> {
         &self,
         signs: &[f64],
         (formula, judge): (&FormulaNumbers, &Numbers),
-    ) -> Option<Selected> {
+    ) -> Option<SelectedTerms> {
         let pull = self.pull(signs);
-        let asked = Asked {
+        let asked = SelectionTask {
             of: self,
             signs,
             pull: &pull,
@@ -133,7 +134,7 @@ impl<'a> Products<'a> {
             return None;
         }
         let left = asked.with_left_out((&chosen, &[]), |left_out, _| left_out.errors())?;
-        Some(Selected {
+        Some(SelectedTerms {
             gain: asked.gain(&[], &chosen)?,
             even: evenly(&none, &left),
             left,
@@ -187,21 +188,21 @@ pub fn gram(more: &DMatrix<f64>) -> DMatrix<f64> {
 /// Columns of a product that one thread makes.
 const SIDE_BY_SIDE: usize = 128;
 
-fn shapes_of(term: &FormulaTerm, names: &Names) -> Vec<String> {
+fn shapes_of(term: &FormulaTerm, names: &TermNames) -> Vec<String> {
     let of = |s: super::term::ShapeNumber| format!("{} {:?}", s.name, s.value);
     term.shapes(names).into_iter().map(of).collect()
 }
 
 /// What is chosen for: a residual with signs.
-struct Asked<'a> {
-    of: &'a Products<'a>,
+struct SelectionTask<'a> {
+    of: &'a TermProducts<'a>,
     signs: &'a [f64],
     pull: &'a DVector<f64>,
     formula: &'a FormulaNumbers,
     judge: &'a Numbers,
 }
 
-impl Asked<'_> {
+impl SelectionTask<'_> {
     /// The fit without each block, of the declared columns and some terms, with columns of more for a look.
     fn sums(&self, used: &[usize]) -> BlockSums {
         let p = self.of;

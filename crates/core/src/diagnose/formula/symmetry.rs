@@ -1,10 +1,10 @@
 //! What kind of physics a formula is, by its symmetries: these hold where no formula is unique.
 
 use super::term::{FormulaTerm, Source};
-use crate::diagnose::outcome::Symmetry;
+use crate::diagnose::outcome::FormulaSymmetry;
 use crate::robot::FormulaSignal;
 
-impl Symmetry {
+impl FormulaSymmetry {
     pub fn of(terms: &[FormulaTerm], squares: &[f64], joint: usize) -> Self {
         let own = Source::Signal(FormulaSignal::Position, joint);
         let total: f64 = squares.iter().sum();
@@ -12,7 +12,7 @@ impl Symmetry {
             let own = terms.iter().zip(squares).filter(|(t, _)| of(t));
             own.map(|(_, square)| square).sum::<f64>() / total.max(f64::MIN_POSITIVE)
         };
-        Symmetry {
+        FormulaSymmetry {
             odd: part(&FormulaTerm::is_odd),
             periodic: part(&|t| t.wave.is_some_and(|(source, _)| source == own)),
             inertial: part(&|t| {

@@ -4,7 +4,7 @@
 use crate::math::hyperbolic::tanh;
 use std::collections::BTreeMap;
 
-use crate::effect::Scene;
+use crate::effect::EffectScene;
 use crate::robot::FormulaSignal;
 
 /// What a function is of.
@@ -47,10 +47,11 @@ pub struct FormulaTerm {
     pub wave: Option<(Source, f64)>,
 }
 
-pub type Powers = BTreeMap<String, i32>;
+/// Powers of the factors of a term, by their names.
+pub type TermPowers = BTreeMap<String, i32>;
 
 /// Names and units on a robot, at one joint.
-pub struct Names<'a> {
+pub struct TermNames<'a> {
     pub joint: usize,
     pub joints: &'a [String],
     /// m or rad of each joint, and the unit of its torque.
@@ -94,7 +95,7 @@ impl Source {
         )
     }
 
-    fn name(self, names: &Names) -> String {
+    fn name(self, names: &TermNames) -> String {
         let of = |signal: FormulaSignal, j: usize| {
             let plain = signal.name();
             let text = format!("{plain}_{}", names.joints[j]);
@@ -115,7 +116,7 @@ impl Source {
     }
 
     /// Its unit; none for a sum of what has different ones.
-    pub fn unit(self, names: &Names) -> Option<Powers> {
+    pub fn unit(self, names: &TermNames) -> Option<TermPowers> {
         use FormulaSignal as Of;
         let position = |j: usize| names.positions[j];
         let of: Vec<(&str, i32)> = match self {
@@ -132,7 +133,7 @@ impl Source {
         Some(own.map(|(unit, p)| (unit.to_owned(), p)).collect())
     }
 
-    fn series(self, scene: &Scene) -> Vec<f64> {
+    fn series(self, scene: &EffectScene) -> Vec<f64> {
         match self {
             Self::Signal(signal, j) => signal.series(scene, j, None),
             Self::State(signal, j, scale) => signal.series(scene, j, Some(scale)),
@@ -183,7 +184,7 @@ impl Factor {
         Self { source, function }
     }
 
-    pub fn series(&self, scene: &Scene) -> Vec<f64> {
+    pub fn series(&self, scene: &EffectScene) -> Vec<f64> {
         let mut x = self.source.series(scene);
         x.iter_mut().for_each(|x| *x = self.function.value(*x));
         x
@@ -209,7 +210,7 @@ impl Factor {
         all
     }
 
-    fn text(&self, names: &Names, shapes: &[ShapeNumber]) -> String {
+    fn text(&self, names: &TermNames, shapes: &[ShapeNumber]) -> String {
         let x = self.source.name(names);
         let own = self.shapes(names).pop();
         let w = own.map_or(String::new(), |own| own.name_among(shapes));
@@ -227,7 +228,7 @@ impl Factor {
     }
 
     /// The scale of the function, or that of what it is of.
-    fn shapes(&self, names: &Names) -> Vec<ShapeNumber> {
+    fn shapes(&self, names: &TermNames) -> Vec<ShapeNumber> {
         let mut all = Vec::new();
         if let Source::State(signal, j, scale) = self.source {
             let name = signal.scale().unwrap_or_default();
@@ -319,8 +320,8 @@ impl FormulaTerm {
     }
 
     /// Unit of its coefficients at a joint; none where no one constant makes the units right.
-    pub fn unit(&self, names: &Names) -> Option<String> {
-        let mut all = Powers::from([(names.torques[names.joint].clone(), 1)]);
+    pub fn unit(&self, names: &TermNames) -> Option<String> {
+        let mut all = TermPowers::from([(names.torques[names.joint].clone(), 1)]);
         for factor in &self.factors {
             let (power, _) = factor.function.power();
             for (unit, p) in factor.source.unit(names)? {
@@ -339,17 +340,17 @@ impl FormulaTerm {
         Some(unit_text(&all))
     }
 
-    pub fn shapes(&self, names: &Names) -> Vec<ShapeNumber> {
+    pub fn shapes(&self, names: &TermNames) -> Vec<ShapeNumber> {
         let mut all: Vec<ShapeNumber> = self.factors.iter().flat_map(|f| f.shapes(names)).collect();
         if let Some((source, n)) = self.wave.filter(|(_, n)| !is_whole(*n)) {
             let unit = source.unit(names).unwrap_or_default();
-            let inverse: Powers = unit.into_iter().map(|(u, p)| (u, -p)).collect();
+            let inverse: TermPowers = unit.into_iter().map(|(u, p)| (u, -p)).collect();
             all.push(shape("n", &source.name(names), n, &unit_text(&inverse)));
         }
         all
     }
 
-    pub fn texts(&self, names: &Names, shapes: &[ShapeNumber]) -> Vec<String> {
+    pub fn texts(&self, names: &TermNames, shapes: &[ShapeNumber]) -> Vec<String> {
         let factors: Vec<String> = self.factors.iter().map(|f| f.text(names, shapes)).collect();
         let Some((source, n)) = self.wave else {
             return vec![factors.join("*")];
@@ -374,7 +375,7 @@ fn is_whole(n: f64) -> bool {
 }
 
 /// Powers of units as a text: `Nm s^2/rad^2`.
-pub fn unit_text(powers: &Powers) -> String {
+pub fn unit_text(powers: &TermPowers) -> String {
     let part = |above: bool| {
         let own = powers
             .iter()
@@ -397,7 +398,7 @@ pub fn unit_text(powers: &Powers) -> String {
 }
 
 /// Names of the numbers that shape terms, each its own; those that are the same stand once.
-pub fn named(terms: &[FormulaTerm], names: &Names) -> Vec<ShapeNumber> {
+pub fn named(terms: &[FormulaTerm], names: &TermNames) -> Vec<ShapeNumber> {
     let mut all: Vec<ShapeNumber> = Vec::new();
     for own in terms.iter().flat_map(|t| t.shapes(names)) {
         if all.iter().any(|s| s.key == own.key) {

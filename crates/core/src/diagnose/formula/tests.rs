@@ -6,10 +6,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::columns::{Columns, RowsOfJoint};
 use super::library::wave;
-use super::select::{Products, Selected, gram};
-use super::term::{Factor, FormulaTerm, Function, Names, Source, named};
+use super::select::{SelectedTerms, TermProducts, gram};
+use super::term::{Factor, FormulaTerm, Function, Source, TermNames, named};
 use crate::diagnose::problem::formula_numbers::FORMULA_NUMBERS;
-use crate::effect::Scene;
+use crate::effect::EffectScene;
 use crate::judge::NUMBERS;
 use crate::motion::Stretch;
 use crate::robot::model::JointFriction;
@@ -18,8 +18,8 @@ use crate::robot::{FormulaSignal, JointKind, Robot};
 const ROWS: usize = 2400;
 const BLOCKS: usize = 24;
 
-fn with_names<T>(of: impl FnOnce(&Names) -> T) -> T {
-    of(&Names {
+fn with_names<T>(of: impl FnOnce(&TermNames) -> T) -> T {
+    of(&TermNames {
         joint: 0,
         joints: &["q1".to_owned(), "arm 2".to_owned()],
         positions: vec!["rad", "m"],
@@ -59,11 +59,11 @@ fn terms() -> Vec<FormulaTerm> {
 }
 
 /// Searches in noise with a torque made of columns of the terms.
-fn search(seed: u64, torque: &dyn Fn(&[Vec<f64>], usize) -> f64) -> Option<Selected> {
+fn search(seed: u64, torque: &dyn Fn(&[Vec<f64>], usize) -> f64) -> Option<SelectedTerms> {
     let (stretch, terms) = (stretch(), terms());
     let robot = Robot::single_joint("q1", JointKind::Revolute);
     let load = vec![vec![0.0; ROWS]];
-    let scene = Scene {
+    let scene = EffectScene {
         robot: &robot,
         theta: &[1.0],
         laws: &[JointFriction::None],
@@ -91,7 +91,7 @@ fn search(seed: u64, torque: &dyn Fn(&[Vec<f64>], usize) -> f64) -> Option<Selec
     };
     let gram = gram(&rows.more);
     let rows = (&rows, &gram, &[0, 1, 2, 3][..]);
-    let products = with_names(|names| Products::of(&terms, rows, names, NUMBERS.ridge))?;
+    let products = with_names(|names| TermProducts::of(&terms, rows, names, NUMBERS.ridge))?;
     products.select(&[1.0; BLOCKS], (&FORMULA_NUMBERS, &NUMBERS))
 }
 

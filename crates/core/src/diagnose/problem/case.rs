@@ -5,14 +5,14 @@ use nalgebra::DMatrix;
 use super::data_split::{DataSplit, LogRole};
 use super::formula_numbers::FormulaNumbers;
 use super::prior::ParameterPrior;
-use super::unknowns::{FreeParameters, Unknowns};
-use crate::effect::{Added, AugmentedModel, Law};
+use super::unknowns::{DiagnosisUnknowns, FreeParameters};
+use crate::effect::{AugmentedModel, Law, ModelEffect};
 use crate::judge::Numbers;
 use crate::motion::{ParallelFilters, Stretch};
 use crate::robot::drive::JointDrive;
 
 /// What a diagnosis works on.
-pub struct Case {
+pub struct DiagnosisCase {
     /// The declared model as it was fitted: what effects are looked for beside.
     pub given: AugmentedModel,
     /// The given model as torques are computed with it.
@@ -37,7 +37,7 @@ pub struct Case {
     /// Effects of the user's own, tried beside those that are known.
     pub own: Vec<&'static Law>,
     /// What the user asks for.
-    pub wishes: Wishes,
+    pub wishes: DiagnosisOptions,
     /// What decides.
     pub numbers: Numbers,
     /// What decides on formulas.
@@ -46,14 +46,14 @@ pub struct Case {
 
 /// What the user asks for besides.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Wishes {
+pub struct DiagnosisOptions {
     /// Effects that are written whatever the judge says: name, and joint where it is of one.
     pub accepted: Vec<(String, Option<String>)>,
     /// A formula of what is left is looked for.
     pub search: bool,
 }
 
-impl Wishes {
+impl DiagnosisOptions {
     /// Whether it is the formula that is searched, of some joint: `formula:JOINT`.
     pub(crate) fn is_formula(&self, (name, _): &(String, Option<String>)) -> bool {
         self.search && name == FORMULA
@@ -76,10 +76,10 @@ pub fn formula_name(joint: &str) -> String {
     format!("formula-{}", plain.collect::<String>())
 }
 
-impl Case {
+impl DiagnosisCase {
     /// The declared unknowns.
-    pub fn unknowns(&self) -> Unknowns {
-        Unknowns::of(&self.given, &self.open, self.kept.is_some())
+    pub fn unknowns(&self) -> DiagnosisUnknowns {
+        DiagnosisUnknowns::of(&self.given, &self.open, self.kept.is_some())
     }
 
     /// Stretches, their filters, and the speeds up to which joints rest.
@@ -96,7 +96,7 @@ impl Case {
     /// Whether an effect is the one that is named, at the joint that is named.
     pub(crate) fn is_named(
         &self,
-        effect: &Added,
+        effect: &ModelEffect,
         (name, joint): &(String, Option<String>),
     ) -> bool {
         effect.name() == name && effect.place.name(&self.given.model.robot) == *joint

@@ -2,16 +2,16 @@
 
 use nalgebra::DVector;
 
-use super::case::Case;
-use super::pass::{ColumnLayout, Data, pass};
-use super::unknowns::{Unknowns, step};
+use super::case::DiagnosisCase;
+use super::pass::{ColumnLayout, WeightedRows, pass};
+use super::unknowns::{DiagnosisUnknowns, step};
 use crate::effect::AugmentedModel;
 use crate::judge::{BlockSums, Terms, TimeBlock};
 use crate::motion::MotionError;
 
 /// A fitted model with the weights of its joints.
 #[derive(Debug, Clone)]
-pub struct Fitted {
+pub struct WeightedModel {
     pub model: AugmentedModel,
     /// 1 / variance of each joint's residual.
     pub weights: Vec<f64>,
@@ -26,11 +26,11 @@ const REWEIGHTED: usize = 3;
 
 /// Fits the declared model to blocks, in weights where they are given. What the data do not determine stays.
 pub fn fit(
-    case: &Case,
+    case: &DiagnosisCase,
     start: &AugmentedModel,
-    (data, blocks): (&Data, &[TimeBlock]),
+    (data, blocks): (&WeightedRows, &[TimeBlock]),
     weights: Option<&[f64]>,
-) -> Result<Fitted, MotionError> {
+) -> Result<WeightedModel, MotionError> {
     // nothing is fitted to the columns of what is held
     let unknowns = case.unknowns().without_held();
     let layout = ColumnLayout::of(&unknowns, &[]);
@@ -56,7 +56,7 @@ pub fn fit(
         let settled = passes > 1 && promised <= SETTLED * terms.weigh(&here);
         if settled || passes == PASSES {
             let weights = weights_at(&here);
-            return Ok(Fitted { model, weights });
+            return Ok(WeightedModel { model, weights });
         }
         step(&mut model, &unknowns, delta.as_slice());
     }
@@ -73,8 +73,8 @@ fn weights_of(squares: &[f64], rows: &[f64]) -> Vec<f64> {
 
 /// The terms of the declared unknowns about a model, with no weights yet.
 pub fn declared_terms(
-    case: &Case,
-    unknowns: &Unknowns,
+    case: &DiagnosisCase,
+    unknowns: &DiagnosisUnknowns,
     layout: &ColumnLayout,
     model: &AugmentedModel,
 ) -> Terms {

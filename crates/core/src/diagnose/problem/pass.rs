@@ -11,10 +11,10 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::data_split::DataSplit;
-use super::unknowns::{Unknown, Unknowns};
-use crate::effect::{Added, AugmentedModel, Scene, Torques, shifted};
+use super::unknowns::{DiagnosisUnknowns, Unknown};
+use crate::effect::{AugmentedModel, EffectScene, ModelEffect, StretchTorques, shifted};
 use crate::judge::{BlockSums, Bound, Term, TimeBlock};
-use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
+use crate::motion::{FilterDesign, MotionError, ParallelFilters, Stretch};
 use crate::robot::model::JointFriction;
 
 /// Channels that are filtered side by side.
@@ -30,7 +30,7 @@ const MOST_ROWS: usize = 40_000;
 
 /// Rows and what each of them counts.
 #[derive(Clone, Copy)]
-pub struct Data<'a> {
+pub struct WeightedRows<'a> {
     pub stretches: &'a [Stretch],
     pub filters: &'a ParallelFilters,
     pub split: &'a DataSplit,
@@ -40,16 +40,16 @@ pub struct Data<'a> {
 
 /// An effect at a place in one shape, with bounds of its coefficients; without any it has no columns.
 #[derive(Debug, Clone)]
-pub struct Candidate {
-    pub effect: Added,
+pub struct EffectCandidate {
+    pub effect: ModelEffect,
     pub bounds: Vec<Bound>,
     /// Shape parameters whose slopes of its torque are columns too, with bounds of a step.
     pub slopes: Vec<(usize, Bound)>,
 }
 
-impl Candidate {
+impl EffectCandidate {
     /// Columns in the rows of a joint: of its coefficients, then slopes.
-    fn columns(&self, scene: &Scene, joint: usize) -> Vec<Vec<f64>> {
+    fn columns(&self, scene: &EffectScene, joint: usize) -> Vec<Vec<f64>> {
         let mut out = self.effect.columns(scene, joint);
         out.truncate(self.bounds.len());
         for (k, _) in &self.slopes {
@@ -86,7 +86,7 @@ pub struct ColumnLayout {
 }
 
 impl ColumnLayout {
-    pub fn of(unknowns: &Unknowns, candidates: &[Candidate]) -> Self {
+    pub fn of(unknowns: &DiagnosisUnknowns, candidates: &[EffectCandidate]) -> Self {
         let joints = unknowns.columns.len();
         let term = |bound| Term {
             columns: Vec::new(),
@@ -125,9 +125,9 @@ impl ColumnLayout {
 /// Sums over blocks of the columns of a model's unknowns and of candidates beside it.
 pub fn pass(
     model: &AugmentedModel,
-    (unknowns, candidates): (&Unknowns, &[Candidate]),
+    (unknowns, candidates): (&DiagnosisUnknowns, &[EffectCandidate]),
     layout: &ColumnLayout,
-    data: &Data,
+    data: &WeightedRows,
     blocks: &[TimeBlock],
 ) -> Result<BlockSums, MotionError> {
     let columns: Vec<usize> = layout.torques.iter().map(|torque| torque + 1).collect();
@@ -152,7 +152,7 @@ pub fn pass(
 }
 
 /// Windows over the rows that blocks need.
-pub fn windows(data: &Data, blocks: &[TimeBlock]) -> Vec<(usize, Range<usize>)> {
+pub fn windows(data: &WeightedRows, blocks: &[TimeBlock]) -> Vec<(usize, Range<usize>)> {
     let mut out = Vec::new();
     for (index, stretch) in data.stretches.iter().enumerate() {
         let pieces = blocks.iter().flat_map(|b| &b.pieces);
@@ -204,12 +204,12 @@ fn fold(
 /// A piece of one stretch with what a model makes of it.
 pub struct Window<'a> {
     model: &'a AugmentedModel,
-    data: &'a Data<'a>,
-    parallel: &'a Parallel,
+    data: &'a WeightedRows<'a>,
+    parallel: &'a FilterDesign,
     stretch: usize,
     /// Samples, from the begin of the lead on.
     pub part: Stretch,
-    torques: Torques,
+    torques: StretchTorques,
     /// Rows of the stretch that are wanted, and the row that the part begins with.
     range: Range<usize>,
     begin: usize,
@@ -218,7 +218,7 @@ pub struct Window<'a> {
 impl<'a> Window<'a> {
     pub fn of(
         model: &'a AugmentedModel,
-        data: &'a Data,
+        data: &'a WeightedRows,
         index: usize,
         range: &Range<usize>,
     ) -> Self {
@@ -240,8 +240,8 @@ impl<'a> Window<'a> {
         }
     }
 
-    pub fn scene(&self) -> Scene<'_> {
-        Scene {
+    pub fn scene(&self) -> EffectScene<'_> {
+        EffectScene {
             robot: &self.model.model.robot,
             theta: &self.model.model.theta,
             laws: &self.model.model.friction,
@@ -256,8 +256,8 @@ impl<'a> Window<'a> {
     /// Rows of every joint, one column each; none of joints that are stationary.
     fn rows(
         &self,
-        unknowns: &Unknowns,
-        candidates: &[Candidate],
+        unknowns: &DiagnosisUnknowns,
+        candidates: &[EffectCandidate],
         layout: &ColumnLayout,
     ) -> Result<Vec<DMatrix<f64>>, MotionError> {
         let mut regressor = regressor(self.model, unknowns, &self.part);
@@ -276,8 +276,8 @@ impl<'a> Window<'a> {
     pub fn rows_of(
         &self,
         j: usize,
-        unknowns: &Unknowns,
-        candidates: &[Candidate],
+        unknowns: &DiagnosisUnknowns,
+        candidates: &[EffectCandidate],
         regressor: &mut [Vec<f64>],
     ) -> Result<DMatrix<f64>, MotionError> {
         let (model, part) = (self.model, &self.part);
@@ -289,7 +289,7 @@ impl<'a> Window<'a> {
             Unknown::Offset(_) => vec![1.0; part.len()],
         };
         let mut raw: Vec<Vec<f64>> = unknowns.columns[j].iter().map(column).collect();
-        let own = |c: &&Candidate| c.effect.place.touches(j) && !c.bounds.is_empty();
+        let own = |c: &&EffectCandidate| c.effect.place.touches(j) && !c.bounds.is_empty();
         for candidate in candidates.iter().filter(own) {
             raw.extend(candidate.columns(&scene, j));
         }
@@ -348,7 +348,7 @@ impl<'a> Window<'a> {
 /// Regressor of the inertial parameters along a stretch, `[joint][parameter][sample]`; nothing where these are kept.
 pub fn regressor(
     model: &AugmentedModel,
-    unknowns: &Unknowns,
+    unknowns: &DiagnosisUnknowns,
     stretch: &Stretch,
 ) -> Vec<Vec<Vec<f64>>> {
     let robot = &model.model.robot;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::unknowns::{Unknown, Unknowns, value_of};
+use super::unknowns::{DiagnosisUnknowns, Unknown, value_of};
 use crate::effect::AugmentedModel;
 use crate::robot::model::JointFriction;
 
@@ -36,7 +36,7 @@ impl ParameterPrior {
     /// Information and its pull on the present model, over the unknowns.
     pub(crate) fn over(
         &self,
-        unknowns: &Unknowns,
+        unknowns: &DiagnosisUnknowns,
         model: &AugmentedModel,
     ) -> (DMatrix<f64>, DVector<f64>) {
         let u = unknowns.len();

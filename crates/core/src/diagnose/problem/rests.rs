@@ -2,7 +2,7 @@
 //! there, and no law of v says which.
 
 use crate::effect::AugmentedModel;
-use crate::motion::{MotionError, Parallel, Stretch, rest};
+use crate::motion::{FilterDesign, MotionError, Stretch, rest};
 use crate::robot::model::JointFriction;
 
 /// Speed below which a joint counts as standing, over its rms speed.
@@ -12,7 +12,7 @@ const STANDING: f64 = 0.01;
 pub(crate) fn standing(
     model: &AugmentedModel,
     stretch: &Stretch,
-    parallel: &Parallel,
+    parallel: &FilterDesign,
     j: usize,
 ) -> Vec<bool> {
     let rows = 0..parallel.rows(stretch.len());
@@ -41,7 +41,7 @@ pub(crate) fn standing(
 pub(crate) fn resting(
     model: &AugmentedModel,
     stretch: &Stretch,
-    parallel: &Parallel,
+    parallel: &FilterDesign,
     rest_speed: &[f64],
 ) -> Result<Vec<Vec<bool>>, MotionError> {
     let rows = parallel.rows(stretch.len());

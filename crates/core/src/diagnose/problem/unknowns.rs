@@ -17,7 +17,7 @@ pub enum Unknown {
 
 /// The unknowns, and which of them have a column in a joint's rows.
 #[derive(Debug, Clone)]
-pub struct Unknowns {
+pub struct DiagnosisUnknowns {
     pub list: Vec<Unknown>,
     /// Parameters that are held as given: their columns tell what their own covariance does to the unknowns.
     pub held: Vec<Unknown>,
@@ -34,7 +34,7 @@ pub struct FreeParameters {
     pub friction: Vec<Vec<bool>>,
 }
 
-impl Unknowns {
+impl DiagnosisUnknowns {
     /// The unknowns of a model; its inertial parameters are held where these are kept.
     pub fn of(model: &AugmentedModel, open: &FreeParameters, keep: bool) -> Self {
         let plain = &model.model;
@@ -57,7 +57,7 @@ impl Unknowns {
             all.filter(|(_, u)| touches(u, j)).map(|(i, _)| i).collect()
         };
         let columns = (0..n).map(of_joint).collect();
-        Unknowns {
+        DiagnosisUnknowns {
             list,
             held,
             columns,
@@ -67,7 +67,7 @@ impl Unknowns {
     /// The same without the columns of what is held.
     pub fn without_held(&self) -> Self {
         let free = |own: &Vec<usize>| own.iter().copied().filter(|i| *i < self.len()).collect();
-        Unknowns {
+        DiagnosisUnknowns {
             list: self.list.clone(),
             held: Vec::new(),
             columns: self.columns.iter().map(free).collect(),
@@ -88,7 +88,7 @@ impl Unknowns {
 }
 
 /// Adds a step to a model; slopes stay positive.
-pub fn step(model: &mut AugmentedModel, unknowns: &Unknowns, delta: &[f64]) {
+pub fn step(model: &mut AugmentedModel, unknowns: &DiagnosisUnknowns, delta: &[f64]) {
     let model = &mut model.model;
     for (unknown, d) in unknowns.list.iter().zip(delta) {
         match *unknown {

@@ -9,12 +9,12 @@ use rayon::prelude::*;
 use super::map::ResidualMap;
 use super::signal::{Signal, values};
 use crate::diagnose::problem::data_split::{LogRole, Piece};
-use crate::diagnose::problem::pass::Data;
-use crate::effect::Torques;
+use crate::diagnose::problem::pass::WeightedRows;
+use crate::effect::StretchTorques;
 
 /// A dependence of one joint's residual.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Dependence {
+pub struct SignalDependence {
     pub joint: usize,
     /// One signal, or two together.
     pub signals: Vec<Signal>,
@@ -47,18 +47,18 @@ struct Rows {
 }
 
 /// What a model leaves of stretches, and what it makes of them.
-pub struct Left<'a> {
-    pub data: &'a Data<'a>,
+pub struct ModelResiduals<'a> {
+    pub data: &'a WeightedRows<'a>,
     /// Filtered residual, `[stretch][joint][row]`.
     pub residual: &'a [Vec<Vec<f64>>],
-    pub torques: &'a [Torques],
+    pub torques: &'a [StretchTorques],
 }
 
 const DRAWS: usize = 199;
 const SEED: u64 = 19_931_983;
 
 /// Blocks of fitted rows, and the signs that each draw gives them.
-struct Signs {
+struct BlockSigns {
     /// Block of each piece; none where it is not fitted.
     of_piece: Vec<Option<usize>>,
     blocks: usize,
@@ -66,7 +66,7 @@ struct Signs {
     of_draws: Vec<Vec<f64>>,
 }
 
-impl Signs {
+impl BlockSigns {
     /// `together` neighbouring pieces are a block.
     fn of(pieces: &[Piece], together: usize) -> Self {
         let mut fitted = 0..;
@@ -79,7 +79,7 @@ impl Signs {
         let mut chance = ChaCha8Rng::seed_from_u64(SEED);
         let mut sign = || if chance.random::<bool>() { 1.0 } else { -1.0 };
         let mut draw = |_| (0..blocks).map(|_| sign()).collect();
-        Signs {
+        BlockSigns {
             of_piece,
             blocks,
             of_draws: (0..DRAWS).map(&mut draw).collect(),
@@ -88,14 +88,18 @@ impl Signs {
 }
 
 /// Dependences of the residuals of `joints`, the strongest of each first; `together` pieces share the residual's memory.
-pub fn dependences(left: &Left, joints: &[usize], together: usize) -> Vec<Dependence> {
-    let signs = Signs::of(&left.data.split.pieces, together);
+pub fn dependences(
+    left: &ModelResiduals,
+    joints: &[usize],
+    together: usize,
+) -> Vec<SignalDependence> {
+    let signs = BlockSigns::of(&left.data.split.pieces, together);
     let of_joint = |j: &usize| of_joint(left, &signs, *j);
-    let found: Vec<Vec<Dependence>> = joints.par_iter().map(of_joint).collect();
+    let found: Vec<Vec<SignalDependence>> = joints.par_iter().map(of_joint).collect();
     found.into_iter().flatten().collect()
 }
 
-fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
+fn of_joint(left: &ModelResiduals, signs: &BlockSigns, j: usize) -> Vec<SignalDependence> {
     let (stretches, torques) = (left.data.stretches, left.torques);
     let rows = rows(left, signs, j);
     let square: f64 = rows.residual.iter().map(|e| e * e).sum();
@@ -118,11 +122,11 @@ fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
         .iter()
         .map(|s| values(*s, j, &rows.at, stretches, torques));
     let values: Vec<Vec<f64>> = values.collect();
-    let taken = |cells: &[usize], count| Taken::of(&rows, signs, cells, count);
+    let taken = |cells: &[usize], count| ExplainedShare::of(&rows, signs, cells, count);
     let alone = values.iter().enumerate();
     let alone = alone.map(|(i, x)| (vec![i], taken(&bins(x, BINS[0]), BINS[0])));
-    let mut tried: Vec<(Vec<usize>, Taken)> = alone.collect();
-    let strongest_first = |tried: &[(Vec<usize>, Taken)]| {
+    let mut tried: Vec<(Vec<usize>, ExplainedShare)> = alone.collect();
+    let strongest_first = |tried: &[(Vec<usize>, ExplainedShare)]| {
         let mut order: Vec<usize> = (0..signals.len()).collect();
         order.sort_by(|a, b| tried[*b].1.surely().total_cmp(&tried[*a].1.surely()));
         order
@@ -144,7 +148,7 @@ fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
         places.fold(f64::MIN, f64::max)
     };
     let best: Vec<f64> = (0..DRAWS).map(best).collect();
-    let mut found: Vec<Dependence> = Vec::new();
+    let mut found: Vec<SignalDependence> = Vec::new();
     for (of, taken) in &tried {
         let own = taken.surely();
         let as_good = best.iter().filter(|b| **b >= own).count();
@@ -161,7 +165,7 @@ fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
         if of.len() == 2 && share < TOGETHER * better {
             continue;
         }
-        found.push(Dependence {
+        found.push(SignalDependence {
             joint: j,
             signals: of.iter().map(|i| signals[*i]).collect(),
             share,
@@ -187,7 +191,7 @@ fn of_joint(left: &Left, signs: &Signs, j: usize) -> Vec<Dependence> {
     found
 }
 
-fn rows(left: &Left, signs: &Signs, j: usize) -> Rows {
+fn rows(left: &ModelResiduals, signs: &BlockSigns, j: usize) -> Rows {
     let mut rows = Rows {
         residual: Vec::new(),
         block: Vec::new(),
@@ -220,15 +224,15 @@ fn bins(x: &[f64], count: usize) -> Vec<usize> {
 }
 
 /// What the means over cells take up of the residual's square, and of the draws.
-struct Taken {
+struct ExplainedShare {
     real: f64,
     draws: Vec<f64>,
     mean: f64,
     deviation: f64,
 }
 
-impl Taken {
-    fn of(rows: &Rows, signs: &Signs, cells: &[usize], count: usize) -> Self {
+impl ExplainedShare {
+    fn of(rows: &Rows, signs: &BlockSigns, cells: &[usize], count: usize) -> Self {
         let blocks = signs.blocks;
         let mut sums = vec![0.0; blocks * count];
         let mut numbers = vec![0.0f64; count];
@@ -251,7 +255,7 @@ impl Taken {
         let number = draws.len() as f64;
         let mean = draws.iter().sum::<f64>() / number;
         let variance = draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / number;
-        Taken {
+        ExplainedShare {
             real: taken(&|_| 1.0),
             draws,
             mean,
@@ -282,7 +286,7 @@ mod tests {
             role: LogRole::Train,
         };
         let pieces: Vec<Piece> = (0..60).map(piece).collect();
-        let signs = Signs::of(&pieces, 1);
+        let signs = BlockSigns::of(&pieces, 1);
         let mut noise = normal(3);
         let signal: Vec<f64> = (0..n).map(|k| (0.0137 * k as f64).sin()).collect();
         let other: Vec<f64> = (0..n).map(|k| (0.0091 * k as f64 + 1.0).sin()).collect();
@@ -293,7 +297,7 @@ mod tests {
             at: Vec::new(),
         };
         let square: f64 = rows.residual.iter().map(|e| e * e).sum();
-        let of = |x: &[f64]| Taken::of(&rows, &signs, &bins(x, BINS[0]), BINS[0]);
+        let of = |x: &[f64]| ExplainedShare::of(&rows, &signs, &bins(x, BINS[0]), BINS[0]);
         let (real, none) = (of(&signal), of(&other));
         // 2 (x^2 - 1/2) has a variance of 1/2 beside the noise's 1
         let share = (real.real - real.mean) / square;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::diagnose::problem::case::Case;
+use crate::diagnose::problem::case::DiagnosisCase;
 use crate::diagnose::problem::data_split::{DataSplit, LogRole};
 use crate::diagnose::problem::rests::{resting, standing};
 use crate::effect::AugmentedModel;
@@ -60,7 +60,8 @@ impl JointErrors {
 
 /// Errors over the rows of one use.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Errors {
+#[schemars(rename = "Errors")]
+pub struct UseErrors {
     pub joints: Vec<JointErrors>,
     pub overall: OverallErrors,
 }
@@ -85,7 +86,7 @@ impl JointChange {
 }
 
 /// Errors of every joint over pieces, `[piece][joint]`.
-pub type Pieces = Vec<Vec<PieceErrors>>;
+pub type ErrorsByPiece = Vec<Vec<PieceErrors>>;
 
 /// Sums of one joint over one piece.
 #[derive(Debug, Clone, Copy, Default)]
@@ -108,12 +109,12 @@ const SEED: u64 = 20_020_520;
 /// Errors of a model over the pieces of a role, all rows of them or without those in which a joint stands.
 pub fn pieces(
     model: &AugmentedModel,
-    case: &Case,
+    case: &DiagnosisCase,
     split: &DataSplit,
     (wanted, moving): (LogRole, bool),
-) -> Result<Pieces, MotionError> {
+) -> Result<ErrorsByPiece, MotionError> {
     let n = model.model.robot.joints();
-    let mut pieces = Pieces::new();
+    let mut pieces = ErrorsByPiece::new();
     for (index, stretch) in case.stretches.iter().enumerate() {
         let own = split.pieces.iter();
         let own = own.filter(|p| p.stretch == index && p.role == wanted);
@@ -205,7 +206,7 @@ fn mean(errors: &[f64]) -> f64 {
 }
 
 /// The same over all pieces; none where there is none.
-pub fn mean_relative_error(pieces: &Pieces) -> Option<f64> {
+pub fn mean_relative_error(pieces: &ErrorsByPiece) -> Option<f64> {
     let all: Vec<usize> = (0..pieces.len()).collect();
     (!all.is_empty()).then(|| mean(&relative(pieces, &all)))
 }
@@ -213,7 +214,7 @@ pub fn mean_relative_error(pieces: &Pieces) -> Option<f64> {
 /// What a change does to the errors of each joint that has one; the bootstrap draws `block` neighbouring pieces at a time.
 pub fn changes(
     joints: &[String],
-    (before, after): (&Pieces, &Pieces),
+    (before, after): (&ErrorsByPiece, &ErrorsByPiece),
     block: usize,
 ) -> Vec<JointChange> {
     let count = before.len();
@@ -239,7 +240,7 @@ pub fn changes(
 }
 
 /// Errors over pieces; none where there is none.
-pub fn summed(case: &Case, (pieces, block): (&Pieces, usize)) -> Option<Errors> {
+pub fn summed(case: &DiagnosisCase, (pieces, block): (&ErrorsByPiece, usize)) -> Option<UseErrors> {
     let units = &case.units;
     let n = units.len();
     if pieces.is_empty() {
@@ -300,7 +301,7 @@ pub fn summed(case: &Case, (pieces, block): (&Pieces, usize)) -> Option<Errors> 
         one_unit.then(|| part(all)).flatten()
     };
     let total = |of: fn(&PieceErrors) -> f64| pieces.iter().flatten().map(of).sum::<f64>();
-    Some(Errors {
+    Some(UseErrors {
         overall: OverallErrors {
             relative_error: one_unit.then(|| ratio(total(|s| s.error), total(|s| s.torque))),
             relative_error_moving: pooled(0),
@@ -318,7 +319,7 @@ mod tests {
     use super::*;
 
     /// Many pieces of one joint with the same torque, whose errors scatter a little.
-    fn pieces(error: f64) -> Pieces {
+    fn pieces(error: f64) -> ErrorsByPiece {
         let piece = |k: usize| PieceErrors {
             error: (error * (1.0 + 0.001 * (k % 3) as f64)).powi(2),
             torque: 1.0,

@@ -8,11 +8,11 @@ pub mod noise_floor;
 mod period;
 pub mod signal;
 
-use self::errors::{Errors, JointErrors};
+use self::errors::{JointErrors, UseErrors};
 
 /// What stays unexplained on one joint, on fitted or on unseen logs, whichever is more.
 #[derive(Debug, Clone, Copy)]
-pub struct Unexplained {
+pub struct UnexplainedResidual {
     /// Fraction of the torque's power that is residual above the noise floor.
     pub share: f64,
     /// Power of the residual over that of the floor; none where the torque was filtered before it was logged,
@@ -20,7 +20,7 @@ pub struct Unexplained {
     pub over_floor: Option<f64>,
 }
 
-impl Unexplained {
+impl UnexplainedResidual {
     /// Whether it is more than noise makes, and worth a name.
     pub fn is_structure(&self) -> bool {
         self.over_floor.is_none_or(|over| over > STRUCTURED) && self.share > NEGLIGIBLE
@@ -45,11 +45,11 @@ const MATTERS: f64 = 0.02;
 const NO_NOISE: f64 = 1e-10;
 
 /// How much of each joint's residual is above the noise floor.
-fn above(noise: &[f64], found: &Errors) -> Vec<Unexplained> {
+fn above(noise: &[f64], found: &UseErrors) -> Vec<UnexplainedResidual> {
     let of_joint = |(e, noise): (&JointErrors, &f64)| {
         let residual = e.power;
         let torque = residual / (e.headline() * e.headline());
-        Unexplained {
+        UnexplainedResidual {
             share: ((residual - noise) / torque).max(0.0),
             over_floor: (*noise > NO_NOISE * torque).then(|| residual / noise),
         }
@@ -59,25 +59,28 @@ fn above(noise: &[f64], found: &Errors) -> Vec<Unexplained> {
 
 /// What is unexplained on fitted logs, or on unseen ones with their own noise where that is more.
 pub fn unexplained(
-    train: &Errors,
+    train: &UseErrors,
     noise: &[f64],
-    unseen: Option<(&Errors, Vec<f64>)>,
-) -> Vec<Unexplained> {
+    unseen: Option<(&UseErrors, Vec<f64>)>,
+) -> Vec<UnexplainedResidual> {
     let train = above(noise, train);
     let Some((holdout, noise)) = unseen else {
         return train;
     };
     let pairs = train.into_iter().zip(above(&noise, holdout)).zip(&noise);
     // a joint that rests there has no floor
-    let more = |((train, unseen), noise): ((Unexplained, Unexplained), &f64)| match *noise > 0.0 {
-        true if unseen.share > train.share => unseen,
-        _ => train,
-    };
+    let more =
+        |((train, unseen), noise): ((UnexplainedResidual, UnexplainedResidual), &f64)| match *noise
+            > 0.0
+        {
+            true if unseen.share > train.share => unseen,
+            _ => train,
+        };
     pairs.map(more).collect()
 }
 
 /// Structure after over structure before, per joint.
-pub fn part_unexplained(noise: &[f64], before: &Errors, after: &Errors) -> Vec<f64> {
+pub fn part_unexplained(noise: &[f64], before: &UseErrors, after: &UseErrors) -> Vec<f64> {
     let shares = above(noise, before).into_iter().zip(above(noise, after));
     shares
         .map(|(before, after)| after.share / before.share.max(f64::MIN_POSITIVE))

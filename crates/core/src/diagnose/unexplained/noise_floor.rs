@@ -11,18 +11,18 @@
 //! frequency is underrated, and then some of it is called structure: the safe side.
 
 use super::period::{period, unrepeated};
-use crate::diagnose::problem::case::Case;
+use crate::diagnose::problem::case::DiagnosisCase;
 use crate::effect::stationary_joints;
-use crate::math::sos::Sos;
+use crate::math::sos::SosFilter;
 use crate::math::zero_phase::ZeroPhase;
-use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
+use crate::motion::{FilterDesign, MotionError, ParallelFilters, Stretch};
 
 /// Borders of the bands that are looked at, over the cut-off.
 const BORDERS: [f64; 3] = [1.5, 2.25, 3.0];
 
 /// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]` along some stretches.
 pub fn floor(
-    case: &Case,
+    case: &DiagnosisCase,
     residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
 ) -> Result<Vec<f64>, MotionError> {
@@ -41,7 +41,7 @@ fn floor_of(
 ) -> Result<Vec<f64>, MotionError> {
     // logs of one rate together
     let bands = filters.designs().iter();
-    let bands = bands.map(|(dt, filter)| Bands::design(filter, 1.0 / dt, band));
+    let bands = bands.map(|(dt, filter)| NoiseBands::design(filter, 1.0 / dt, band));
     let bands = bands.collect::<Result<Vec<_>, _>>()?;
     let rate_of: Vec<usize> = stretches.iter().map(|s| filters.rate_of(s)).collect();
     let periods: Vec<Option<usize>> = stretches.iter().map(|s| period(&s.q)).collect();
@@ -62,8 +62,8 @@ fn floor_of(
 }
 
 /// Variance of the noise of one joint over the logs of every rate, by the rows that each keeps.
-fn over_rates(bands: &[Bands], noise: &[Vec<StretchNoise>]) -> f64 {
-    let of_rate = |(bands, noise): (&Bands, &Vec<StretchNoise>)| {
+fn over_rates(bands: &[NoiseBands], noise: &[Vec<StretchNoise>]) -> f64 {
+    let of_rate = |(bands, noise): (&NoiseBands, &Vec<StretchNoise>)| {
         let samples: f64 = noise.iter().map(|s| s.weight).sum();
         let rows = samples / bands.parallel.decimation as f64;
         (rows, together(noise, bands.seen, bands.kept))
@@ -81,8 +81,8 @@ fn over_rates(bands: &[Bands], noise: &[Vec<StretchNoise>]) -> f64 {
 }
 
 /// The two bands beyond the one that is kept, and the blocks that are looked at.
-struct Bands<'a> {
-    parallel: &'a Parallel,
+struct NoiseBands<'a> {
+    parallel: &'a FilterDesign,
     /// What each band sees of white noise and of white noise differentiated twice.
     seen: [[f64; 2]; 2],
     /// What the band that is kept sees of them.
@@ -96,19 +96,23 @@ struct Bands<'a> {
     gain: f64,
 }
 
-impl<'a> Bands<'a> {
-    fn design(parallel: &'a Parallel, rate: f64, band: (f64, bool)) -> Result<Self, MotionError> {
+impl<'a> NoiseBands<'a> {
+    fn design(
+        parallel: &'a FilterDesign,
+        rate: f64,
+        band: (f64, bool),
+    ) -> Result<Self, MotionError> {
         let (cutoff_hz, averaged) = band;
         let top = (0.45 * rate / (BORDERS[2] * cutoff_hz)).min(1.0);
         let low_pass = |times: f64| -> Result<ZeroPhase, MotionError> {
             let cutoff = times * top * cutoff_hz;
-            Ok(ZeroPhase::new(Sos::butterworth(4, cutoff, rate)?))
+            Ok(ZeroPhase::new(SosFilter::butterworth(4, cutoff, rate)?))
         };
         let [near, middle, far] = BORDERS.map(low_pass);
         let passes = [near?, middle?, far?];
         let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
         let width = top * cutoff_hz * (BORDERS[1] - BORDERS[0]);
-        let mut bands = Bands {
+        let mut bands = NoiseBands {
             parallel,
             seen: [[0.0; 2]; 2],
             kept: [0.0; 2],
@@ -180,8 +184,8 @@ impl<'a> Bands<'a> {
         let near = self.parted(residual)?;
         Ok(Some(StretchNoise {
             weight: residual.len() as f64,
-            near: near.map(|x| Middle::of(powers(&x[inner.clone()]), self.freedom)),
-            top: Middle::of(powers(&differences), f64::INFINITY).value / self.gain,
+            near: near.map(|x| BlockMedian::of(powers(&x[inner.clone()]), self.freedom)),
+            top: BlockMedian::of(powers(&differences), f64::INFINITY).value / self.gain,
             repeated,
         }))
     }
@@ -191,7 +195,7 @@ impl<'a> Bands<'a> {
 struct StretchNoise {
     weight: f64,
     /// Power in the two bands.
-    near: [Middle; 2],
+    near: [BlockMedian; 2],
     /// Variance of white noise by the top of the spectrum.
     top: f64,
     /// Variance in the band that is kept of what does not repeat.
@@ -208,7 +212,7 @@ fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> 
         stretches.iter().map(|s| s.weight * of(s)).sum::<f64>() / rows
     };
     // bands are taken together before anything is solved for, so that their errors average out
-    let near = [0, 1].map(|band: usize| Middle {
+    let near = [0, 1].map(|band: usize| BlockMedian {
         value: mean(&|s| s.near[band].value),
         error: (mean(&|s| s.weight * s.near[band].error.powi(2)) / rows).sqrt(),
     });
@@ -219,7 +223,7 @@ fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> 
 }
 
 /// Variances of white and of rising noise in the band that is kept, from those in two bands, which see `seen[band][source]`.
-fn carried_on(near: [Middle; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> [f64; 2] {
+fn carried_on(near: [BlockMedian; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> [f64; 2] {
     let [[w, r], [x, s]] = seen;
     let determinant = w * s - r * x;
     let [first, second] = near.map(|n| n.value);
@@ -248,12 +252,12 @@ const MIN_BLOCKS: usize = 8;
 
 /// Median of blocks with its standard error, as if they were normal between their quartiles.
 #[derive(Debug, Clone, Copy, Default)]
-struct Middle {
+struct BlockMedian {
     value: f64,
     error: f64,
 }
 
-impl Middle {
+impl BlockMedian {
     /// Of powers with so many independent numbers in each; 0 of none.
     fn of(mut values: Vec<f64>, freedom: f64) -> Self {
         values.sort_by(f64::total_cmp);
@@ -271,7 +275,7 @@ impl Middle {
             true => value,
             false => 1.2533 * spread / (n as f64).sqrt() / below,
         };
-        Middle { value, error }
+        BlockMedian { value, error }
     }
 }
 
@@ -305,7 +309,7 @@ mod tests {
     fn noise_that_rises_is_distinguished_from_white_noise_and_what_it_hides_is_its_standard_error()
     {
         let (seen, kept) = ([[1.0, 3.0], [2.0, 20.0]], [5.0, 0.5]);
-        let known = |value: f64| Middle { value, error: 0.0 };
+        let known = |value: f64| BlockMedian { value, error: 0.0 };
         let of = |white: f64, rising: f64| {
             let near = seen.map(|[w, r]| known(w * white + r * rising));
             carried_on(near, seen, kept)
@@ -318,7 +322,7 @@ mod tests {
         // a spectrum that falls: the lower of the two bands
         assert_eq!(carried_on([4.0, 2.0].map(known), seen, kept), [5.0, 0.0]);
         // rising noise alone, known to a tenth: (20 * 0.3 hypot 3 * 2) / 14 of white noise may be there
-        let near = [3.0, 20.0].map(|value| Middle {
+        let near = [3.0, 20.0].map(|value| BlockMedian {
             value,
             error: 0.1 * value,
         });
@@ -330,8 +334,9 @@ mod tests {
     #[test]
     fn a_middle_has_the_standard_error_of_a_median() {
         let mut draw = normal(9);
-        let mut middle = |_| Middle::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY);
-        let found: Vec<Middle> = (0..2000).map(&mut middle).collect();
+        let mut middle =
+            |_| BlockMedian::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY);
+        let found: Vec<BlockMedian> = (0..2000).map(&mut middle).collect();
         let scatter = found.iter().map(|m| (m.value - 3.0).powi(2)).sum::<f64>() / 2000.0;
         let shown = found.iter().map(|m| m.error).sum::<f64>() / 2000.0;
         let off = (shown / scatter.sqrt() - 1.0).abs();

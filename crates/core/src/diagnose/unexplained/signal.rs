@@ -1,6 +1,6 @@
 //! Signals on which a residual may depend.
 
-use crate::effect::Torques;
+use crate::effect::StretchTorques;
 use crate::motion::Stretch;
 
 /// What a residual may depend on; positions, speeds and temperatures of any joint, all else of its own.
@@ -23,7 +23,7 @@ pub(in crate::diagnose) fn values(
     j: usize,
     rows: &[(usize, usize)],
     stretches: &[Stretch],
-    torques: &[Torques],
+    torques: &[StretchTorques],
 ) -> Vec<f64> {
     let since: Vec<Vec<f64>> = match signal {
         Signal::SinceReversal => stretches.iter().map(|s| since_reversal(s, j)).collect(),

@@ -1,16 +1,19 @@
 use super::super::trial::FrictionTrial;
 use super::*;
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 
 fn run(
     trial: &FrictionTrial,
     seed: u64,
-    options: &Options,
+    options: &FrictionOptions,
 ) -> Result<JointEstimate, FrictionError> {
     of(&trial.prepared(seed), options)
 }
 
-fn of(prepared: &Prepared, options: &Options) -> Result<JointEstimate, FrictionError> {
+fn of(
+    prepared: &PreparedProblem,
+    options: &FrictionOptions,
+) -> Result<JointEstimate, FrictionError> {
     estimate("q1", &["inertia".to_owned()], prepared, None, options)
 }
 
@@ -26,8 +29,8 @@ fn curve_error(e: &JointEstimate, law: &DoubleTanh) -> f64 {
 #[test]
 fn friction_inertia_and_offset_come_out_of_a_quantised_noisy_log() {
     let trial = FrictionTrial::usual();
-    let e = run(&trial, 3, &Options::default()).unwrap();
-    assert_eq!(e.ending, Ending::Converged);
+    let e = run(&trial, 3, &FrictionOptions::default()).unwrap();
+    assert_eq!(e.ending, IterationEnding::Converged);
     assert!(curve_error(&e, &trial.law) < 2e-3);
     for (v, truth) in e.values.iter().zip(trial.law.parameters()) {
         assert_eq!(v.verdict, Verdict::Identified);
@@ -50,10 +53,10 @@ fn a_start_wrong_by_three_in_everything_ends_at_the_same_law() {
     for (x, f) in p.iter_mut().zip(wrong) {
         *x *= f;
     }
-    let options = Options {
+    let options = FrictionOptions {
         start: Some(DoubleTanh::from_parameters(p)),
         start_inertia: Some(4.0),
-        ..Options::default()
+        ..FrictionOptions::default()
     };
     let e = run(&trial, 4, &options).unwrap();
     assert!(curve_error(&e, &trial.law) < 2e-3);
@@ -64,7 +67,7 @@ fn a_reversal_too_quick_to_see_bounds_the_slope_from_below_only() {
     let mut trial = FrictionTrial::usual();
     trial.law = DoubleTanh::from_parameters([30.0, 14.0, 0.0, 1e5, 12.0]);
     trial.motion = vec![(0.05, 1.1)];
-    let e = run(&trial, 5, &Options::default()).unwrap();
+    let e = run(&trial, 5, &FrictionOptions::default()).unwrap();
     let steep = &e.values[3];
     assert_eq!(steep.verdict, Verdict::LowerBound, "{:?}", e.values);
     assert!(steep.value < 1e5 && steep.value > 100.0, "{steep:?}");
@@ -78,7 +81,7 @@ fn a_force_that_the_model_lacks_leaves_innovations_beyond_their_bounds() {
     for (tau, q) in motion.tau.iter_mut().zip(&motion.q) {
         *tau += 3.0 * (300.0 * q).sin();
     }
-    let nis = of(&trial.prepared_of(motion), &Options::default());
+    let nis = of(&trial.prepared_of(motion), &FrictionOptions::default());
     let nis = nis.unwrap().nis;
     assert!(nis.mean > 2.0 * nis.upper_95, "{nis:?}");
     // what single innovations do not show
@@ -92,7 +95,7 @@ fn motion_in_one_direction_is_answered_with_what_is_missing() {
     for v in &mut prepared.velocity {
         *v = v.abs();
     }
-    let error = of(&prepared, &Options::default()).unwrap_err();
+    let error = of(&prepared, &FrictionOptions::default()).unwrap_err();
     let named = matches!(error, FrictionError::NeverReverses { .. });
     assert!(named, "{error}");
     assert!(error.to_string().contains("both directions"));
@@ -109,7 +112,7 @@ fn the_plateau_map_lies_on_the_curve() {
             (sign * 0.1 / (n * n), 0.2 * n)
         })
         .collect();
-    let e = run(&trial, 7, &Options::default()).unwrap();
+    let e = run(&trial, 7, &FrictionOptions::default()).unwrap();
     assert!(e.plateaus.len() >= 3);
     for p in &e.plateaus {
         let f = trial.law.torque(p.v);

@@ -12,15 +12,15 @@ use crate::robot::standard::{STANDARD, pseudo_inertia, standard_of};
 const INSIDE: f64 = 0.9;
 
 /// Priors of links and of positive numbers: what the search begins from and is drawn to.
-pub(super) struct Cone {
+pub(super) struct ConePrior {
     /// Pseudo-inertia of each link.
     pub links: Vec<Matrix4<f64>>,
     pub numbers: Vec<f64>,
 }
 
-/// A point inside.
+/// A point inside the cone of consistent parameters: inertias of links, positive numbers, and their factors.
 #[derive(Clone)]
-pub(super) struct Inside {
+pub(super) struct InteriorPoint {
     pub links: Vec<Matrix4<f64>>,
     pub numbers: Vec<f64>,
     /// Lower Cholesky factors of the links.
@@ -63,13 +63,13 @@ fn coordinates(x: &Matrix4<f64>) -> [f64; STANDARD] {
     out
 }
 
-impl Inside {
+impl InteriorPoint {
     /// The point, where every link is positive definite and every number above zero.
     pub fn new(links: Vec<Matrix4<f64>>, numbers: Vec<f64>) -> Option<Self> {
         let of = |j: &Matrix4<f64>| j.cholesky().map(|factor| factor.l());
         let factors = links.iter().map(of).collect::<Option<_>>()?;
         let positive = numbers.iter().all(|x| *x > 0.0 && x.is_finite());
-        positive.then_some(Inside {
+        positive.then_some(InteriorPoint {
             links,
             numbers,
             factors,
@@ -114,7 +114,7 @@ impl Inside {
         let numbers = self.numbers.iter().enumerate();
         let numbers = numbers.map(|(k, x)| x * (1.0 + part * step[first + k]));
         let links = self.factors.iter().enumerate().map(link);
-        Inside::new(links.collect(), numbers.collect())
+        InteriorPoint::new(links.collect(), numbers.collect())
     }
 
     /// The longest part of a step that stays well inside, at most 1.
@@ -133,13 +133,13 @@ impl Inside {
     }
 }
 
-impl Cone {
-    pub fn start(&self) -> Option<Inside> {
-        Inside::new(self.links.clone(), self.numbers.clone())
+impl ConePrior {
+    pub fn start(&self) -> Option<InteriorPoint> {
+        InteriorPoint::new(self.links.clone(), self.numbers.clone())
     }
 
     /// Sum of the distances from the priors.
-    pub fn distance(&self, at: &Inside) -> f64 {
+    pub fn distance(&self, at: &InteriorPoint) -> f64 {
         let mut sum = 0.0;
         for ((j, l), prior) in at.links.iter().zip(&at.factors).zip(&self.links) {
             let Some(prior) = prior.cholesky() else {
@@ -155,7 +155,7 @@ impl Cone {
     }
 
     /// What pulls to the priors alone, without the barrier, in the own coordinates of a point: J0^-1 in them.
-    pub fn pull(&self, at: &Inside) -> DVector<f64> {
+    pub fn pull(&self, at: &InteriorPoint) -> DVector<f64> {
         let mut out = Vec::new();
         for (l, prior) in at.factors.iter().zip(&self.links) {
             let inverse = prior
@@ -186,16 +186,16 @@ pub(super) fn prior_of(standard: &[f64; STANDARD]) -> Option<Matrix4<f64>> {
 mod tests {
     use super::*;
 
-    fn cone() -> Cone {
+    fn cone() -> ConePrior {
         let prior = [0.05, 0.001, -0.002, 0.06, 0.003, 0.04, 0.1, -0.05, 0.2, 2.0];
-        Cone {
+        ConePrior {
             links: vec![prior_of(&prior).unwrap()],
             numbers: vec![0.3],
         }
     }
 
     /// A point away from the priors, and a step.
-    fn moved(cone: &Cone) -> (Inside, DVector<f64>) {
+    fn moved(cone: &ConePrior) -> (InteriorPoint, DVector<f64>) {
         let step = DVector::from_fn(STANDARD + 1, |k, _| 0.05 * (k as f64 * 1.7).sin());
         let at = cone.start().unwrap().after(&(3.0 * &step), 1.0).unwrap();
         (at, step)

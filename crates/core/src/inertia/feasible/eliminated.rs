@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::ConsistencyProblem;
-use super::cone::Inside;
-use super::friction::Bounded;
+use super::cone::InteriorPoint;
+use super::friction::FrictionLevels;
 use crate::math::rfactor::RFactor;
 
 /// The factor by standard parameters and friction levels.
@@ -25,8 +25,11 @@ impl EliminatedFactor {
     pub fn of(task: &ConsistencyProblem) -> Self {
         let u = task.factor.ncols() - 1;
         let p = task.map.matrix.nrows();
-        let of_friction = Bounded::of(task.friction, task.factor);
-        let levels: Vec<_> = of_friction.iter().flat_map(Bounded::levels).collect();
+        let of_friction = FrictionLevels::of(task.friction, task.factor);
+        let levels: Vec<_> = of_friction
+            .iter()
+            .flat_map(FrictionLevels::levels)
+            .collect();
         let shared = task.map.columns();
         let mut whole = DMatrix::zeros(u, shared + levels.len());
         whole
@@ -63,7 +66,7 @@ impl EliminatedFactor {
         self.friction.iter().copied()
     }
 
-    pub fn residual(&self, at: &Inside) -> DVector<f64> {
+    pub fn residual(&self, at: &InteriorPoint) -> DVector<f64> {
         &self.rows * at.standard() - &self.target
     }
 

@@ -16,18 +16,18 @@ pub struct FrictionColumns {
 const PLAIN_SHARE: f64 = 0.01;
 
 /// A level of friction that is above zero: its parts in the unknowns, and what it is before data.
-pub(super) struct Level {
+pub(super) struct FrictionLevel {
     pub parts: Vec<(usize, f64)>,
     pub plain: f64,
 }
 
 /// The friction of a joint by levels: that as the joint begins to move, and that at its greatest speed.
-pub(super) struct Bounded {
-    at_rest: Option<Level>,
-    at_speed: Option<Level>,
+pub(super) struct FrictionLevels {
+    at_rest: Option<FrictionLevel>,
+    at_speed: Option<FrictionLevel>,
 }
 
-impl Bounded {
+impl FrictionLevels {
     /// Of every joint; a level that no row shows is not asked for, and its unknowns stay at nothing.
     pub fn of(friction: &[FrictionColumns], factor: &DMatrix<f64>) -> Vec<Self> {
         let target = factor.column(factor.ncols() - 1).norm();
@@ -38,7 +38,7 @@ impl Bounded {
             }
             let size = column.norm();
             let plain = (1.0 + PLAIN_SHARE * target) / size;
-            (size > 0.0 && plain.is_finite()).then_some(Level { parts, plain })
+            (size > 0.0 && plain.is_finite()).then_some(FrictionLevel { parts, plain })
         };
         let of = |of: &FrictionColumns| {
             let FrictionColumns {
@@ -49,16 +49,16 @@ impl Bounded {
             let seen = [viscous, coulomb].map(|k| factor.column(k).amax() > 0.0);
             match (seen, speed.is_finite()) {
                 // f_c = level at rest, f_v = (level at speed - level at rest) / speed
-                ([true, true], true) if speed > 0.0 => Bounded {
+                ([true, true], true) if speed > 0.0 => FrictionLevels {
                     at_rest: level(vec![(coulomb, 1.0), (viscous, -1.0 / speed)]),
                     at_speed: level(vec![(viscous, 1.0 / speed)]),
                 },
                 // whatever the level at rest, the slope decides
-                ([_, true], false) | ([false, true], _) => Bounded {
+                ([_, true], false) | ([false, true], _) => FrictionLevels {
                     at_rest: level(vec![(coulomb, 1.0)]),
                     at_speed: level(vec![(viscous, 1.0)]),
                 },
-                _ => Bounded {
+                _ => FrictionLevels {
                     at_rest: level(vec![(coulomb, 1.0)]),
                     at_speed: None,
                 },
@@ -67,7 +67,7 @@ impl Bounded {
         friction.iter().map(of).collect()
     }
 
-    pub fn levels(&self) -> impl Iterator<Item = &Level> {
+    pub fn levels(&self) -> impl Iterator<Item = &FrictionLevel> {
         self.at_rest.iter().chain(&self.at_speed)
     }
 }

@@ -16,11 +16,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::solution::FitError;
 use crate::math::MathError;
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 use crate::math::rfactor::RFactor;
 use crate::robot::bodies::StandardMap;
 use crate::robot::standard::{Body, STANDARD};
-use cone::{Cone, Inside, prior_of};
+use cone::{ConePrior, InteriorPoint, prior_of};
 use eliminated::EliminatedFactor;
 
 /// Weight of the prior: a body that is off by a factor e in mass or size costs as much as one independent row of data
@@ -64,7 +64,7 @@ pub struct ConsistencyProblem<'a> {
 
 /// Physically consistent parameters.
 #[derive(Debug, Clone)]
-pub struct Feasible {
+pub struct FeasibleParameters {
     /// All unknowns, in the order of the factor's columns.
     pub theta: DVector<f64>,
     /// Standard parameters of each link.
@@ -77,7 +77,7 @@ pub struct Feasible {
     /// parameters, up to what the prior pulls: the duality gap.
     pub gap: f64,
     /// Converged where Newton's decrement proves the gap.
-    pub ending: Ending,
+    pub ending: IterationEnding,
     pub iterations: usize,
 }
 
@@ -87,7 +87,7 @@ pub struct Feasible {
 ///
 /// # Errors
 /// [`FitError`].
-pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
+pub fn feasible(task: &ConsistencyProblem) -> Result<FeasibleParameters, FitError> {
     let links = task.map.links.len();
     let drives = task.map.drives.len();
     if !task.factor.iter().all(|x| x.is_finite()) {
@@ -103,7 +103,7 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     }
     let mut numbers = vec![PLAIN_DRIVE; drives];
     numbers.extend(rows.plain_friction());
-    let cone = Cone {
+    let cone = ConePrior {
         links: priors,
         numbers,
     };
@@ -114,7 +114,7 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     let stages = (misfit / PRIOR_WEIGHT).log(FALL).ceil() as i32;
     for stage in (0..=stages).rev() {
         let enough = if stage == 0 { AT_END } else { NEAR };
-        let stage = Stage {
+        let stage = WeightStage {
             rows: &rows,
             cone: &cone,
             weight: PRIOR_WEIGHT * FALL.powi(stage),
@@ -123,14 +123,14 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
         (at, steps, decrement) = stage.descend(at, enough);
         iterations += steps;
     }
-    let last = Stage {
+    let last = WeightStage {
         rows: &rows,
         cone: &cone,
         weight: PRIOR_WEIGHT,
     };
     let gap = last.gap(&at);
     let standard = at.standard();
-    Ok(Feasible {
+    Ok(FeasibleParameters {
         theta: rows.complete(&standard),
         links: (0..links)
             .map(|i| std::array::from_fn(|k| standard[STANDARD * i + k]))
@@ -139,8 +139,8 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
         given,
         gap,
         ending: match decrement <= NEAR {
-            true => Ending::Converged,
-            false => Ending::IterationLimit,
+            true => IterationEnding::Converged,
+            false => IterationEnding::IterationLimit,
         },
         iterations,
     })
@@ -184,20 +184,20 @@ fn not_finite(factor: &DMatrix<f64>) -> MathError {
 }
 
 /// The search under one weight of the prior.
-struct Stage<'a> {
+struct WeightStage<'a> {
     rows: &'a EliminatedFactor,
-    cone: &'a Cone,
+    cone: &'a ConePrior,
     weight: f64,
 }
 
-impl Stage<'_> {
-    fn cost(&self, at: &Inside) -> f64 {
+impl WeightStage<'_> {
+    fn cost(&self, at: &InteriorPoint) -> f64 {
         self.rows.residual(at).norm_squared() + self.weight * self.cone.distance(at)
     }
 
     /// Newton's step in the own coordinates of a point, by least squares and not by its squares; and the decrement's
     /// square in units of the barrier. Nothing where numbers leave the finite.
-    fn step(&self, at: &Inside) -> Option<(DVector<f64>, f64)> {
+    fn step(&self, at: &InteriorPoint) -> Option<(DVector<f64>, f64)> {
         let jacobian = at.in_own_coordinates(&self.rows.rows);
         let n = jacobian.ncols();
         let half = (0.5 * self.weight).sqrt();
@@ -222,7 +222,7 @@ impl Stage<'_> {
     }
 
     /// Steps until the decrement is small `enough`, or digits are used up; how many they were, and the last decrement.
-    fn descend(&self, start: Inside, enough: f64) -> (Inside, usize, f64) {
+    fn descend(&self, start: InteriorPoint, enough: f64) -> (InteriorPoint, usize, f64) {
         let (mut at, mut before) = (start, f64::INFINITY);
         for taken in 0..MAX_STEPS {
             let Some((step, decrement)) = self.step(&at) else {
@@ -239,7 +239,7 @@ impl Stage<'_> {
             let safe = 1.0 / (1.0 + decrement.sqrt());
             loop {
                 let next = at.after(&step, part);
-                let lower = |next: &Inside| {
+                let lower = |next: &InteriorPoint| {
                     decrement < NEAR
                         || part <= safe
                         || self.cost(next) <= cost - SUFFICIENT * part * promised
@@ -260,7 +260,7 @@ impl Stage<'_> {
 
     /// Duality gap of the sum of squares with the prior's pull: what their gradient gives along the point itself. Near the
     /// optimum that gradient is the weight over the point, positive definite for every link and number.
-    fn gap(&self, at: &Inside) -> f64 {
+    fn gap(&self, at: &InteriorPoint) -> f64 {
         let jacobian = at.in_own_coordinates(&self.rows.rows);
         let slope =
             jacobian.tr_mul(&self.rows.residual(at)) * 2.0 + self.cone.pull(at) * self.weight;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::robot::cft::{Setup, Structure};
+use crate::robot::cft::{LaboratorySetup, ParameterStructure};
 use crate::robot::standard::pseudo_inertia;
 use crate::robot::tree::{Coordinate, Link, Tree};
 use crate::robot::{JointKind, Robot};
@@ -73,12 +73,12 @@ fn bodies(count: usize) -> DVector<f64> {
     DVector::from_vec((0..count).flat_map(|i| body(i).standard()).collect())
 }
 
-fn all_consistent(found: &Feasible) -> bool {
+fn all_consistent(found: &FeasibleParameters) -> bool {
     let consistent = |s: &[f64; STANDARD]| pseudo_inertia(s).symmetric_eigenvalues().min() > 0.0;
     found.links.iter().all(consistent) && found.drives.iter().all(|d| *d > 0.0)
 }
 
-fn without_priors(map: &StandardMap, factor: &DMatrix<f64>) -> Feasible {
+fn without_priors(map: &StandardMap, factor: &DMatrix<f64>) -> FeasibleParameters {
     let bodies = vec![None; map.links.len()];
     let task = ConsistencyProblem {
         map,
@@ -96,7 +96,7 @@ fn both(
     truth: &DVector<f64>,
     rows: usize,
     noise: f64,
-) -> (f64, f64, Feasible, DVector<f64>) {
+) -> (f64, f64, FeasibleParameters, DVector<f64>) {
     let map = robot.standard_map();
     let factor = factor(robot, truth, rows, noise);
     let u = truth.len() + 1;
@@ -126,8 +126,8 @@ fn beyond(robot: &Robot, free: &DVector<f64>) -> f64 {
 fn where_the_truth_is_consistent_the_fit_hardly_suffers() {
     for robot in [
         arm(),
-        Robot::cft(Setup::default(), Structure::Full22),
-        Robot::cft(Setup::default(), Structure::Printed12),
+        Robot::cft(LaboratorySetup::default(), ParameterStructure::Full22),
+        Robot::cft(LaboratorySetup::default(), ParameterStructure::Printed12),
     ] {
         let map = robot.standard_map();
         let mut standard = bodies(map.links.len());
@@ -144,7 +144,10 @@ fn where_the_truth_is_consistent_the_fit_hardly_suffers() {
 
 #[test]
 fn rows_whose_free_fit_is_inconsistent_give_links_that_are_not() {
-    for robot in [arm(), Robot::cft(Setup::default(), Structure::Full22)] {
+    for robot in [
+        arm(),
+        Robot::cft(LaboratorySetup::default(), ParameterStructure::Full22),
+    ] {
         let map = robot.standard_map();
         let mut standard = bodies(map.links.len());
         standard.extend(map.drives.iter().map(|_| 0.01));

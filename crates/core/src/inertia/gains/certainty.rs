@@ -8,8 +8,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::GainFit;
-use super::problem::Problem;
-use super::search::{Found, RANK_TOLERANCE};
+use super::problem::GainProblem;
+use super::search::{GainSolution, RANK_TOLERANCE};
 use crate::inertia::covariance::{at_least, bandwidth};
 use crate::inertia::solution::FitError;
 use crate::math::rank;
@@ -18,7 +18,7 @@ use crate::math::rank;
 const OPEN: f64 = 1e-4;
 
 /// Inverse of the weighted normal matrix, and the directions that it leaves open.
-struct Solved {
+struct NormalInverse {
     /// Directions that the rows determine, in which the normal matrix is 1, unknowns x their number.
     sure: DMatrix<f64>,
     /// Columns in scaled unknowns.
@@ -26,8 +26,8 @@ struct Solved {
     scale: Vec<f64>,
 }
 
-impl Solved {
-    fn of(problem: &Problem, x: &DVector<f64>, weights: &[f64]) -> Result<Self, FitError> {
+impl NormalInverse {
+    fn of(problem: &GainProblem, x: &DVector<f64>, weights: &[f64]) -> Result<Self, FitError> {
         let r = problem.linearised(x, weights);
         let u = r.ncols() - 1;
         let scale: Vec<f64> = (0..u).map(|c| r.column(c).norm()).collect();
@@ -37,7 +37,7 @@ impl Solved {
         let kept = |k: &usize| svd.s[*k] > RANK_TOLERANCE * svd.s[0];
         let (sure, open): (Vec<usize>, Vec<usize>) = (0..svd.s.len()).partition(kept);
         let entry = |a: usize, c: usize| svd.v[(a, sure[c])] * unscale(a) / svd.s[sure[c]];
-        Ok(Solved {
+        Ok(NormalInverse {
             sure: DMatrix::from_fn(u, sure.len(), entry),
             open: svd.v.select_columns(&open),
             scale,
@@ -58,18 +58,18 @@ impl Solved {
 }
 
 /// One block of time: its stretch, its score, and its weighted slopes in the directions that are reported.
-struct Moment {
+struct BlockMoment {
     stretch: usize,
     score: DVector<f64>,
     normal: DMatrix<f64>,
 }
 
 fn moments(
-    problem: &Problem,
+    problem: &GainProblem,
     x: &DVector<f64>,
     weights: &[f64],
     sure: &DMatrix<f64>,
-) -> Vec<Moment> {
+) -> Vec<BlockMoment> {
     let (mut out, mut shift) = (Vec::new(), 0);
     for set in &problem.sets {
         for block in &set.factors.blocks {
@@ -85,7 +85,7 @@ fn moments(
                 let slopes = rows.slopes * sure.select_rows(&places) * weights[j];
                 normal += slopes.tr_mul(&slopes);
             }
-            out.push(Moment {
+            out.push(BlockMoment {
                 stretch: shift + block.stretch,
                 score,
                 normal,
@@ -101,10 +101,10 @@ const LEFT: f64 = 1e-9;
 
 /// Covariance of all unknowns.
 fn covariance(
-    problem: &Problem,
+    problem: &GainProblem,
     x: &DVector<f64>,
     weights: &[f64],
-    solved: &Solved,
+    solved: &NormalInverse,
 ) -> DMatrix<f64> {
     let u = problem.unknowns();
     let sure = &solved.sure;
@@ -142,10 +142,10 @@ fn covariance(
 }
 
 /// Rates the end of the search.
-pub(super) fn certain(problem: &Problem, found: Found) -> Result<GainFit, FitError> {
+pub(super) fn certain(problem: &GainProblem, found: GainSolution) -> Result<GainFit, FitError> {
     let n = problem.joints();
     let weights: Vec<f64> = found.residual_std.iter().map(|s| 1.0 / s).collect();
-    let solved = Solved::of(problem, &found.x, &weights)?;
+    let solved = NormalInverse::of(problem, &found.x, &weights)?;
     let covariance = covariance(problem, &found.x, &weights, &solved);
     let x = &found.x;
     // of ln |c_j|, and with a payload of ln |c_j mu|
@@ -186,7 +186,7 @@ pub(super) fn certain(problem: &Problem, found: Found) -> Result<GainFit, FitErr
 /// The joint beside which most others are determined, and best; and the gradients of their differences to it.
 fn beside_one(
     gradients: &[DVector<f64>],
-    solved: &Solved,
+    solved: &NormalInverse,
     variance: &dyn Fn(&DVector<f64>) -> f64,
 ) -> (usize, Vec<DVector<f64>>) {
     let beside = |reference: usize| -> Vec<DVector<f64>> {

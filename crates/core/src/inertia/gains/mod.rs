@@ -25,10 +25,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
 use super::solution::{FitError, joints, solve};
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 
+use problem::GainProblem;
 pub use problem::PayloadColumns;
-use problem::Problem;
 
 /// The rows that gains are fitted to.
 #[derive(Debug, Clone, Copy)]
@@ -54,7 +54,7 @@ pub struct GainFit {
     /// Residual of each joint in the channel's unit.
     pub residual_std: Vec<f64>,
     pub iterations: usize,
-    pub ending: Ending,
+    pub ending: IterationEnding,
 }
 
 /// Fits the gains of all joints.
@@ -62,7 +62,7 @@ pub struct GainFit {
 /// # Errors
 /// [`FitError`]: too few rows, or nothing that moves.
 pub fn fit_gains(rows: &GainRows) -> Result<GainFit, FitError> {
-    let problem = Problem::new(rows)?;
+    let problem = GainProblem::new(rows)?;
     let found = search::search(&problem)?;
     certainty::certain(&problem, found)
 }

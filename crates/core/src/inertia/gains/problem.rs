@@ -57,7 +57,7 @@ impl PayloadColumns {
 }
 
 /// One of the two sets of logs.
-pub(super) struct Set<'a> {
+pub(super) struct LogSet<'a> {
     pub factors: &'a BlockFactors,
     /// R factor of each joint's rows.
     pub joints: Vec<DMatrix<f64>>,
@@ -72,9 +72,9 @@ pub(super) struct Rows {
 }
 
 /// Unknowns are \[c (n) | theta (p) | load: mass, rest | psi of each joint\].
-pub(super) struct Problem<'a> {
+pub(super) struct GainProblem<'a> {
     pub columns: &'a RegressorColumns,
-    pub sets: Vec<Set<'a>>,
+    pub sets: Vec<LogSet<'a>>,
     /// Base parameters of the payload's unknowns, p x loads.
     pub load: DMatrix<f64>,
     /// Root mean square of each joint's channel.
@@ -83,11 +83,11 @@ pub(super) struct Problem<'a> {
     pub rows: Vec<f64>,
 }
 
-impl<'a> Problem<'a> {
+impl<'a> GainProblem<'a> {
     pub fn new(rows: &GainRows<'a>) -> Result<Self, FitError> {
         let columns = &rows.unloaded.columns;
         let p = columns.shared;
-        let set = |factors: &'a BlockFactors, loaded: bool| Set {
+        let set = |factors: &'a BlockFactors, loaded: bool| LogSet {
             factors,
             joints: (0..columns.joints).map(|j| factors.joint(j)).collect(),
             loaded,
@@ -117,7 +117,7 @@ impl<'a> Problem<'a> {
         if channel_rms.iter().any(|rms| *rms <= 0.0) {
             return Err(FitError::NothingExcited);
         }
-        Ok(Problem {
+        Ok(GainProblem {
             columns,
             load,
             rows: counts,
@@ -202,7 +202,7 @@ impl<'a> Problem<'a> {
     /// Standard deviation of each joint's residual in the channel's unit.
     pub fn residual_std(&self, x: &DVector<f64>) -> Vec<f64> {
         let std = |j: usize| {
-            let residual = |s: &Set| self.rows_of(x, &s.joints[j], j, s.loaded).residual;
+            let residual = |s: &LogSet| self.rows_of(x, &s.joints[j], j, s.loaded).residual;
             let squares = self.sets.iter().map(|s| residual(s).norm_squared());
             let floor = 1e-9 * self.channel_rms[j];
             (squares.sum::<f64>() / self.rows[j].max(1.0))

@@ -6,18 +6,18 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::Problem;
+use super::problem::GainProblem;
 use crate::inertia::solution::FitError;
-use crate::math::descent::Ending;
+use crate::math::descent::IterationEnding;
 use crate::math::rank;
 use crate::math::rfactor::RFactor;
 
 /// Where the search ended.
-pub(super) struct Found {
+pub(super) struct GainSolution {
     pub x: DVector<f64>,
     pub residual_std: Vec<f64>,
     pub iterations: usize,
-    pub ending: Ending,
+    pub ending: IterationEnding,
 }
 
 const MOST_STEPS: usize = 100;
@@ -29,7 +29,7 @@ const SETTLED: f64 = 1e-13;
 pub(super) const RANK_TOLERANCE: f64 = 1e-8;
 
 /// Searches from equal channels and from the total least squares; the more likely end stands.
-pub(super) fn search(problem: &Problem) -> Result<Found, FitError> {
+pub(super) fn search(problem: &GainProblem) -> Result<GainSolution, FitError> {
     let n = problem.joints();
     let equal = DVector::from_element(n, 1.0);
     let mut starts = vec![equal];
@@ -48,7 +48,7 @@ pub(super) fn search(problem: &Problem) -> Result<Found, FitError> {
         gains = found;
     }
     let starts = [starts.first(), starts.last()].into_iter().flatten();
-    let mut best: Option<(f64, Found)> = None;
+    let mut best: Option<(f64, GainSolution)> = None;
     for c in starts {
         let found = descend(problem, c.clone())?;
         let value = criterion(problem, &found.residual_std);
@@ -59,14 +59,14 @@ pub(super) fn search(problem: &Problem) -> Result<Found, FitError> {
     best.map(|(_, found)| found).ok_or(FitError::NothingExcited)
 }
 
-fn descend(problem: &Problem, start: DVector<f64>) -> Result<Found, FitError> {
+fn descend(problem: &GainProblem, start: DVector<f64>) -> Result<GainSolution, FitError> {
     let n = problem.joints();
     let mut std = problem.channel_rms.clone();
     let mut x = linear(problem, &levelled(start), &inverse(&std))?;
     std = problem.residual_std(&x);
     let mut value = criterion(problem, &std);
-    let (mut iterations, mut ending) = (0, Ending::IterationLimit);
-    while iterations < MOST_STEPS && ending == Ending::IterationLimit {
+    let (mut iterations, mut ending) = (0, IterationEnding::IterationLimit);
+    while iterations < MOST_STEPS && ending == IterationEnding::IterationLimit {
         iterations += 1;
         let weights = inverse(&std);
         let step = least_squares(&problem.linearised(&x, &weights), 0)?;
@@ -87,10 +87,10 @@ fn descend(problem: &Problem, start: DVector<f64>) -> Result<Found, FitError> {
             }
         };
         if fall < SETTLED {
-            ending = Ending::Converged;
+            ending = IterationEnding::Converged;
         }
     }
-    Ok(Found {
+    Ok(GainSolution {
         x,
         residual_std: std,
         iterations,
@@ -99,7 +99,7 @@ fn descend(problem: &Problem, start: DVector<f64>) -> Result<Found, FitError> {
 }
 
 /// Minus the logarithm of the likelihood over the mean number of rows, but for a constant.
-fn criterion(problem: &Problem, std: &[f64]) -> f64 {
+fn criterion(problem: &GainProblem, std: &[f64]) -> f64 {
     let all: f64 = problem.rows.iter().sum();
     let share = |rows: &f64| rows * std.len() as f64 / all;
     let each = std.iter().zip(&problem.rows);
@@ -117,7 +117,11 @@ fn levelled(c: DVector<f64>) -> DVector<f64> {
 }
 
 /// All unknowns with the gains given.
-fn linear(problem: &Problem, c: &DVector<f64>, weights: &[f64]) -> Result<DVector<f64>, FitError> {
+fn linear(
+    problem: &GainProblem,
+    c: &DVector<f64>,
+    weights: &[f64],
+) -> Result<DVector<f64>, FitError> {
     let n = problem.joints();
     let mut x = DVector::zeros(problem.unknowns());
     x.rows_mut(0, n).copy_from(c);
@@ -146,7 +150,7 @@ fn least_squares(r: &DMatrix<f64>, first: usize) -> Result<DVector<f64>, FitErro
 
 /// Gains up to a common factor by those of the step before (Gautier and Briot 2014).
 fn total_least_squares(
-    problem: &Problem,
+    problem: &GainProblem,
     gains: &[f64],
     std: &[f64],
 ) -> Result<Vec<f64>, FitError> {

@@ -1,5 +1,5 @@
-use super::super::columns::Own;
-use super::super::solve::{Weighting, fit};
+use super::super::columns::JointTerm;
+use super::super::solve::{RowWeighting, fit};
 use super::*;
 use crate::robot::JointKind;
 use rand::{RngExt, SeedableRng};
@@ -10,7 +10,7 @@ const STEP: f64 = 0.002;
 const FORCE_NOISE: f64 = 2.0;
 
 fn columns() -> RegressorColumns {
-    RegressorColumns::of_one(&[Own::Viscous, Own::Offset], None)
+    RegressorColumns::of_one(&[JointTerm::Viscous, JointTerm::Offset], None)
 }
 
 fn settings() -> FilterSettings {
@@ -68,10 +68,10 @@ fn plain(noise: f64, seed: u64) -> Fit {
     let mut source = once(log(noise, seed, false));
     let (factors, _) =
         super::super::accumulate(&robot, &columns(), &settings(), &mut source).unwrap();
-    fit(&factors, Weighting::Wls).unwrap()
+    fit(&factors, RowWeighting::Wls).unwrap()
 }
 
-fn instrumental(noise: f64, seed: u64, reference: ReferenceSource) -> Instrumental {
+fn instrumental(noise: f64, seed: u64, reference: ReferenceSource) -> InstrumentalFit {
     let robot = Robot::single_joint("q1", JointKind::Prismatic);
     let start = plain(noise, seed);
     iterate(&columns(), &start, &mut |theta| {
@@ -94,7 +94,7 @@ fn instrumental(noise: f64, seed: u64, reference: ReferenceSource) -> Instrument
 #[test]
 fn without_noise_in_position_instruments_change_nothing() {
     let (plain, found) = (plain(0.0, 1), instrumental(0.0, 1, ReferenceSource::Logged));
-    assert_eq!(found.ending, Ending::Converged);
+    assert_eq!(found.ending, IterationEnding::Converged);
     for i in 0..3 {
         let std = plain.covariance[(i, i)].sqrt();
         assert!((plain.theta[i] - found.fit.theta[i]).abs() < std, "{i}");

@@ -1,5 +1,5 @@
 use super::*;
-use crate::math::sos::Sos;
+use crate::math::sos::SosFilter;
 
 fn value(k: usize, c: usize) -> f64 {
     let x = k as f64;
@@ -11,12 +11,12 @@ fn value(k: usize, c: usize) -> f64 {
 
 #[test]
 fn outputs_that_are_kept_are_those_of_both_passes_over_all_samples() {
-    let butterworth = |order, cutoff| Sos::butterworth(order, cutoff, 1000.0).unwrap();
+    let butterworth = |order, cutoff| SosFilter::butterworth(order, cutoff, 1000.0).unwrap();
     let designs = [
         butterworth(4, 5.0),
         butterworth(2, 60.0),
         butterworth(3, 20.0),
-        Sos::chebyshev(8, 0.05, 20.0, 1000.0).unwrap(),
+        SosFilter::chebyshev(8, 0.05, 20.0, 1000.0).unwrap(),
     ];
     for sos in designs {
         let filter = ZeroPhase::new(sos);
@@ -66,7 +66,7 @@ fn outputs_that_are_kept_are_those_of_both_passes_over_all_samples() {
 
 #[test]
 fn too_few_samples_are_refused() {
-    let filter = ZeroPhase::new(Sos::butterworth(4, 20.0, 1000.0).unwrap());
+    let filter = ZeroPhase::new(SosFilter::butterworth(4, 20.0, 1000.0).unwrap());
     let of = KeptRows {
         samples: 15,
         channels: 1,

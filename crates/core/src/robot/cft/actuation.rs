@@ -16,7 +16,8 @@ pub const ENCODER_SCALE: [f64; 4] = [8.7989e-6, 7.5209e-6, 1.6886e-5, 5.0e-6];
 /// Which of the two laboratory set-ups drives the robot (Remark 5, Table 6).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Setup {
+#[schemars(rename = "Setup")]
+pub enum LaboratorySetup {
     /// TUeDACS: amplifiers of 1.6 A/V.
     #[default]
     Tuedacs,
@@ -53,7 +54,7 @@ impl ActuationLimits {
     }
 }
 
-impl Setup {
+impl LaboratorySetup {
     /// K_T of x_c1..x_c4: N/V, N/V, N m/V, N/V (Table 6).
     pub const fn gains(self) -> [f64; 4] {
         match self {

@@ -18,7 +18,7 @@ use super::geometry::{D, D6, GRAVITY, L4, L6, U};
 /// The coefficients of the closed form, linear in theta_1..theta_12 and in the ten base parameters
 /// that the printed structure leaves out. Computed once for many samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coefficients {
+pub struct ReportCoefficients {
     /// theta_1 = m1 + m2 (kg): the mass that only q1 moves.
     pub t1: f64,
     /// Mr (kg): what q1 moves besides theta_1.
@@ -42,7 +42,7 @@ pub struct Coefficients {
     pub sideways: [f64; 4],
 }
 
-impl Coefficients {
+impl ReportCoefficients {
     /// From theta_1..theta_12 of Table 4 (SI).
     pub fn from_theta12(theta: &[f64; 12]) -> Self {
         let [t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12] = *theta;
@@ -101,7 +101,7 @@ fn pose(q: &[f64; 4]) -> Pose {
 }
 
 /// M in the velocities (v1, v2, v4, w), upper part as [M12, M1phi, M1psi, M22, M2phi, M2psi, P, X, R] with M11 apart.
-fn inertia_in_angles(p: &Pose, k: &Coefficients) -> [f64; 9] {
+fn inertia_in_angles(p: &Pose, k: &ReportCoefficients) -> [f64; 9] {
     let [s2, c2, s4, c4, s, c, s5, c5] = *p;
     let [a, b, cc, e] = k.h;
     let moving = a * s4 + b * s + cc * c4 + e * c;
@@ -134,7 +134,7 @@ fn inertia_in_angles(p: &Pose, k: &Coefficients) -> [f64; 9] {
 }
 
 /// Christoffel matrix in the velocities (v1, v2, v4, w), columns 2, phi, psi; the first is zero.
-fn christoffel_in_angles(p: &Pose, k: &Coefficients, v: &[f64; 4]) -> [[f64; 3]; 4] {
+fn christoffel_in_angles(p: &Pose, k: &ReportCoefficients, v: &[f64; 4]) -> [[f64; 3]; 4] {
     let [s2, c2, s4, c4, s, c, s5, c5] = *p;
     let (v2, v4, w) = (v[1], v[2], v[2] + v[3]);
     let [a, b, cc, e] = k.h;
@@ -175,7 +175,7 @@ fn christoffel_in_angles(p: &Pose, k: &Coefficients, v: &[f64; 4]) -> [[f64; 3];
     ]
 }
 
-fn gravity_in_angles(p: &Pose, k: &Coefficients) -> [f64; 2] {
+fn gravity_in_angles(p: &Pose, k: &ReportCoefficients) -> [f64; 2] {
     let [_, _, s4, c4, s, c, ..] = *p;
     let [a, b, cc, e] = k.h;
     let m = L4 * k.mr;
@@ -185,7 +185,7 @@ fn gravity_in_angles(p: &Pose, k: &Coefficients) -> [f64; 2] {
     ]
 }
 
-fn inertia_in_joints(k: &Coefficients, m: [f64; 9]) -> [[f64; 4]; 4] {
+fn inertia_in_joints(k: &ReportCoefficients, m: [f64; 9]) -> [[f64; 4]; 4] {
     let [m12, m1phi, m1psi, m22, m2phi, m2psi, p, x, r] = m;
     let (m13, m23, m34) = (m1phi + m1psi, m2phi + m2psi, x + r);
     [
@@ -197,12 +197,12 @@ fn inertia_in_joints(k: &Coefficients, m: [f64; 9]) -> [[f64; 4]; 4] {
 }
 
 /// Inertia matrix M(q) of eq. (60), symmetric, joint order (q1, q2, q4, q5); kg, kg m, kg m^2.
-pub fn inertia(q: &[f64; 4], k: &Coefficients) -> [[f64; 4]; 4] {
+pub fn inertia(q: &[f64; 4], k: &ReportCoefficients) -> [[f64; 4]; 4] {
     inertia_in_joints(k, inertia_in_angles(&pose(q), k))
 }
 
 /// Coriolis matrix C(q, v) in the Christoffel form of eq. (16), so that dM/dt - 2 C is skew (19).
-pub fn coriolis(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> [[f64; 4]; 4] {
+pub fn coriolis(q: &[f64; 4], v: &[f64; 4], k: &ReportCoefficients) -> [[f64; 4]; 4] {
     let [r1, r2, phi, psi] = christoffel_in_angles(&pose(q), k, v);
     let row = |r: [f64; 3]| [0.0, r[0], r[1] + r[2], r[2]];
     [
@@ -214,13 +214,17 @@ pub fn coriolis(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> [[f64; 4]; 4] {
 }
 
 /// Gravity torque G(q) of eq. (60), (17), in N and N m; zero on q1 and q2.
-pub fn gravity_torque(q: &[f64; 4], k: &Coefficients) -> [f64; 4] {
+pub fn gravity_torque(q: &[f64; 4], k: &ReportCoefficients) -> [f64; 4] {
     let [phi, psi] = gravity_in_angles(&pose(q), k);
     [0.0, 0.0, phi + psi, psi]
 }
 
 /// M(q) and C(q, v) v + G(q) from one set of sines and cosines: what an integrator needs.
-pub fn inertia_and_bias(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> ([[f64; 4]; 4], [f64; 4]) {
+pub fn inertia_and_bias(
+    q: &[f64; 4],
+    v: &[f64; 4],
+    k: &ReportCoefficients,
+) -> ([[f64; 4]; 4], [f64; 4]) {
     let p = pose(q);
     let m = inertia_in_joints(k, inertia_in_angles(&p, k));
     let c = christoffel_in_angles(&p, k, v);
@@ -232,7 +236,12 @@ pub fn inertia_and_bias(q: &[f64; 4], v: &[f64; 4], k: &Coefficients) -> ([[f64;
 }
 
 /// Torque without friction, M a + C v + G, in N and N m.
-pub fn inverse_dynamics(q: &[f64; 4], v: &[f64; 4], a: &[f64; 4], k: &Coefficients) -> [f64; 4] {
+pub fn inverse_dynamics(
+    q: &[f64; 4],
+    v: &[f64; 4],
+    a: &[f64; 4],
+    k: &ReportCoefficients,
+) -> [f64; 4] {
     let (m, bias) = inertia_and_bias(q, v, k);
     std::array::from_fn(|i| {
         bias[i] + m[i][0] * a[0] + m[i][1] * a[1] + m[i][2] * a[2] + m[i][3] * a[3]

@@ -5,7 +5,7 @@ use super::geometry::{D, D6, GRAVITY, L2, L4, L5, L6, L7};
 use super::links::PseudoInertia;
 use crate::robot::joint::JointKind;
 use crate::robot::standard::standard_of;
-use crate::robot::tree::{Coordinate, DependentCoordinate, Link, Sine, Tree, TreeError};
+use crate::robot::tree::{Coordinate, DependentCoordinate, Link, SineTerm, Tree, TreeError};
 use nalgebra::Matrix4;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -18,7 +18,7 @@ pub(crate) const LINKS: usize = 8;
 /// None: a test builds it.
 pub fn chain() -> Result<Tree, TreeError> {
     use JointKind::{Prismatic, Revolute};
-    let sine = |of: Vec<(usize, f64)>| Sine {
+    let sine = |of: Vec<(usize, f64)>| SineTerm {
         amplitude: L4,
         phase: 0.0,
         of,

@@ -23,8 +23,8 @@ pub mod regressor;
 
 mod parameters;
 
-pub use actuation::{ActuationLimits, Setup};
-pub use dynamics::Coefficients;
+pub use actuation::{ActuationLimits, LaboratorySetup};
+pub use dynamics::ReportCoefficients;
 pub use parameters::{EXTENDED, PRINTED, UNPRINTED};
 
 /// Joint names in the order of all vectors.
@@ -34,7 +34,7 @@ pub const COORDINATES: [&str; 4] = ["x_c1", "x_c2", "x_c3", "x_c4"];
 
 /// How many inertial parameters the model carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Structure {
+pub enum ParameterStructure {
     /// theta_1..theta_12, the report's structure.
     #[default]
     Printed12,

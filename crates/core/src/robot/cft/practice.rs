@@ -5,9 +5,9 @@
 //! x_c4) with a damping of 0.6, for the inertia that its motor sees in the middle of the limits (229 kg
 //! on y_r, 270 kg on x_r, 1.3 kg m^2 on x_c3, 129 kg on x_c4).
 
-use super::actuation::Setup;
+use super::actuation::LaboratorySetup;
 use super::pantograph::{DOWNWARD_RATIO, OUTWARD_RATIO};
-use crate::robot::practice::{Excitation, Practice};
+use crate::robot::practice::{Excitation, OperatingDefaults};
 
 /// theta_1..theta_12: the three values of Table 4 that survive, and synthetic ones that make M
 /// positive definite over the workspace.
@@ -61,14 +61,14 @@ pub fn coordinate_speeds() -> [f64; 4] {
     std::array::from_fn(|i| ratio[i] * CONVERSION[i] * MOTOR_SPEED)
 }
 
-pub fn of(setup: Setup) -> Practice {
+pub fn of(setup: LaboratorySetup) -> OperatingDefaults {
     // Volts per newton differ by a factor of four between the set-ups.
-    let scale = Setup::Tuedacs.gains()[0] / setup.gains()[0];
+    let scale = LaboratorySetup::Tuedacs.gains()[0] / setup.gains()[0];
     let gains = |of_tuedacs: [f64; 4]| of_tuedacs.map(|gain| scale * gain).to_vec();
     let joint = ladders(setup);
     // The motor's own share of the joint values: x_c4 is q1, x_c3 is q2.
     let part = |j: usize| joint[j].map(|x| 0.3 * x);
-    Practice {
+    OperatingDefaults {
         volts: AMPLIFIER,
         speeds: coordinate_speeds().to_vec(),
         control: [
@@ -84,18 +84,18 @@ pub fn of(setup: Setup) -> Practice {
 }
 
 /// Slowest plateau, and an acceleration that leaves the amplifiers a reserve, for q1, q2, q4, q5.
-fn ladders(setup: Setup) -> [[f64; 2]; 4] {
+fn ladders(setup: LaboratorySetup) -> [[f64; 2]; 4] {
     let accelerations = match setup {
-        Setup::Tuedacs => [3.0, 8.0, 10.0, 10.0],
-        Setup::Dspace => [0.6, 6.0, 6.0, 6.0],
+        LaboratorySetup::Tuedacs => [3.0, 8.0, 10.0, 10.0],
+        LaboratorySetup::Dspace => [0.6, 6.0, 6.0, 6.0],
     };
     std::array::from_fn(|j| [SLOWEST[j], accelerations[j]])
 }
 
 /// Table 3 on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
-fn excitation(setup: Setup) -> Excitation {
+fn excitation(setup: LaboratorySetup) -> Excitation {
     let (mut offset, a, b) = TABLE_3;
-    if setup == Setup::Dspace {
+    if setup == LaboratorySetup::Dspace {
         offset[3] = setup.limits().middles()[3];
     }
     let rows = |rows: [[f64; 4]; 4]| rows.map(|row| row.to_vec()).to_vec();

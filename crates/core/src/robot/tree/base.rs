@@ -22,7 +22,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// One base parameter: a kept standard parameter and what is grouped into it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Grouping {
+pub struct ParameterGroup {
     /// Index of the kept standard parameter.
     pub kept: usize,
     /// Indices of the parameters grouped into it, with their coefficients.
@@ -35,7 +35,7 @@ pub fn standard_parameters(tree: &Tree, drive_inertia: bool) -> usize {
 }
 
 /// The base parameters in the order of their kept parameters.
-pub fn groupings(tree: &Tree, drive_inertia: bool) -> Vec<Grouping> {
+pub fn groupings(tree: &Tree, drive_inertia: bool) -> Vec<ParameterGroup> {
     let n = tree.joints();
     let p = standard_parameters(tree, drive_inertia);
     let states = (3 * p).div_ceil(n) + 8;
@@ -78,13 +78,13 @@ pub fn groupings(tree: &Tree, drive_inertia: bool) -> Vec<Grouping> {
 }
 
 /// Orthogonalises columns in their order; those that no joint moves both (by the bits of `moved_by`) are so already.
-fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
+fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<ParameterGroup> {
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let largest = columns.iter().map(|c| norm(c)).fold(0.0, f64::max);
     let mut basis: Vec<(Vec<f64>, u64)> = Vec::new();
     // R, column by column: coefficients of the kept columns in the orthonormal basis
     let mut triangle: Vec<Vec<f64>> = Vec::new();
-    let mut found: Vec<Grouping> = Vec::new();
+    let mut found: Vec<ParameterGroup> = Vec::new();
     for (index, column) in columns.iter().enumerate() {
         let size = norm(column);
         if size <= TOLERANCE * largest {
@@ -100,7 +100,7 @@ fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
                 if of & joints == 0 {
                     continue;
                 }
-                *total += widest(Projection {
+                *total += widest(ColumnProjection {
                     of: &mut rest,
                     along: b,
                 });
@@ -115,7 +115,7 @@ fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
             basis.push((rest, joints));
             along.push(left);
             triangle.push(along);
-            found.push(Grouping {
+            found.push(ParameterGroup {
                 kept: index,
                 terms: Vec::new(),
             });
@@ -136,12 +136,12 @@ fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
 }
 
 /// Takes off what a column has along a unit one: how much that is.
-struct Projection<'a> {
+struct ColumnProjection<'a> {
     of: &'a mut [f64],
     along: &'a [f64],
 }
 
-impl LaneWork for Projection<'_> {
+impl LaneWork for ColumnProjection<'_> {
     type Output = f64;
 
     #[inline(always)]

@@ -6,8 +6,8 @@ use nalgebra::Matrix3;
 
 use super::space::{Vector, add, cross, dot, times};
 
-/// Centre and radius \[m\].
-pub type Ball = (Vector, f64);
+/// Centre and radius \[m\] of a ball that holds points.
+pub type BoundingBall = (Vector, f64);
 
 /// Ends of the piece and radius \[m\] of a capsule.
 pub type EnclosedPiece = ([Vector; 2], f64);
@@ -15,7 +15,7 @@ pub type EnclosedPiece = ([Vector; 2], f64);
 /// The smallest capsule that holds every ball among those along a direction of `axes`, unit vectors, or along a
 /// principal axis of the centres: about the smallest circle that holds what is seen along it, no longer than the round
 /// ends allow. `None` without balls.
-pub fn enclosing(balls: &[Ball], axes: &[Vector]) -> Option<EnclosedPiece> {
+pub fn enclosing(balls: &[BoundingBall], axes: &[Vector]) -> Option<EnclosedPiece> {
     let own = principal_axes(balls);
     let along = own.iter().chain(axes).map(|axis| of_axis(balls, axis));
     along
@@ -30,9 +30,9 @@ pub fn volume((ends, radius): &EnclosedPiece) -> f64 {
 }
 
 /// Eigenvectors of the centres' covariance; none where they cannot be found.
-fn principal_axes(balls: &[Ball]) -> Vec<Vector> {
+fn principal_axes(balls: &[BoundingBall]) -> Vec<Vector> {
     let share = 1.0 / balls.len().max(1) as f64;
-    let sum = |a: Vector, (centre, _): &Ball| add(&a, &times(share, centre));
+    let sum = |a: Vector, (centre, _): &BoundingBall| add(&a, &times(share, centre));
     let mean = balls.iter().fold([0.0; 3], sum);
     let mut covariance = Matrix3::zeros();
     for (centre, _) in balls {
@@ -48,7 +48,7 @@ fn principal_axes(balls: &[Ball]) -> Vec<Vector> {
 }
 
 /// The smallest capsule along one direction.
-fn of_axis(balls: &[Ball], axis: &Vector) -> Option<EnclosedPiece> {
+fn of_axis(balls: &[BoundingBall], axis: &Vector) -> Option<EnclosedPiece> {
     // the unit vector that lies most across, for directions across
     let least = (0..3).min_by(|a, b| axis[*a].abs().total_cmp(&axis[*b].abs()))?;
     let mut unit = [0.0; 3];
@@ -56,7 +56,7 @@ fn of_axis(balls: &[Ball], axis: &Vector) -> Option<EnclosedPiece> {
     let across = cross(axis, &unit);
     let e1 = times(1.0 / dot(&across, &across).sqrt(), &across);
     let e2 = cross(axis, &e1);
-    let circles: Vec<Circle> = balls
+    let circles: Vec<BoundingCircle> = balls
         .iter()
         .map(|(centre, radius)| ([dot(centre, &e1), dot(centre, &e2)], *radius))
         .collect();
@@ -80,7 +80,8 @@ fn of_axis(balls: &[Ball], axis: &Vector) -> Option<EnclosedPiece> {
     Some(([end(low), end(high)], radius))
 }
 
-type Circle = ([f64; 2], f64);
+/// Centre and radius \[m\] of a circle in a plane.
+type BoundingCircle = ([f64; 2], f64);
 
 /// Rounds of the search for a smallest circle; few are needed, for each adds the farthest of all.
 const ROUNDS: usize = 40;
@@ -88,13 +89,13 @@ const ROUNDS: usize = 40;
 const STEPS: usize = 1000;
 
 /// About the smallest circle around all others (Badoiu, Clarkson 2003, Smaller core-sets for balls).
-fn smallest_circle(circles: &[Circle]) -> Option<Circle> {
-    let farthest = |among: &[Circle], middle: [f64; 2]| -> Option<(Circle, f64)> {
-        let reach = |c: &Circle| (*c, (c.0[0] - middle[0]).hypot(c.0[1] - middle[1]) + c.1);
+fn smallest_circle(circles: &[BoundingCircle]) -> Option<BoundingCircle> {
+    let farthest = |among: &[BoundingCircle], middle: [f64; 2]| -> Option<(BoundingCircle, f64)> {
+        let reach = |c: &BoundingCircle| (*c, (c.0[0] - middle[0]).hypot(c.0[1] - middle[1]) + c.1);
         let all = among.iter().map(reach);
         all.max_by(|a, b| a.1.total_cmp(&b.1))
     };
-    let mut few: Vec<Circle> = Vec::new();
+    let mut few: Vec<BoundingCircle> = Vec::new();
     let mut middle = circles.first()?.0;
     let mut best = (middle, f64::INFINITY);
     for _ in 0..ROUNDS {
@@ -130,7 +131,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn holds(piece: &EnclosedPiece, ball: &Ball) -> bool {
+    fn holds(piece: &EnclosedPiece, ball: &BoundingBall) -> bool {
         let off = of_pieces(&piece.0, &[ball.0, ball.0]);
         off + ball.1 <= piece.1 + 1e-12
     }
@@ -145,7 +146,7 @@ mod tests {
             let turned = of_roll_pitch_yaw(&std::array::from_fn(|_| number(3.0)));
             let count = [1, 2, 3, 50, 400][case % 5];
             let with_radius = case % 3 == 0;
-            let balls: Vec<Ball> = (0..count)
+            let balls: Vec<BoundingBall> = (0..count)
                 .map(|_| {
                     let at = std::array::from_fn(|k| number(sizes[k]) + 3.0);
                     let radius = number(1.0).abs();
@@ -162,7 +163,7 @@ mod tests {
     fn a_turned_capsule_is_found_again_and_a_box_as_trigonometry_has_it() {
         let turned = of_roll_pitch_yaw(&[0.4, -1.1, 2.0]);
         let ends = [[0.1, -0.2, 0.3], [0.1, -0.2, 0.9]].map(|end| turn(&turned, &end));
-        let balls: Vec<Ball> = ends.iter().map(|end| (*end, 0.07)).collect();
+        let balls: Vec<BoundingBall> = ends.iter().map(|end| (*end, 0.07)).collect();
         let (found, radius) = enclosing(&balls, &[]).expect("two balls");
         assert!((radius - 0.07).abs() < 1e-9, "{radius}");
         let near = |a: &Vector, b: &Vector| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-6);
@@ -171,14 +172,14 @@ mod tests {
                 || near(&found[0], &ends[1]) && near(&found[1], &ends[0])
         );
         // corners of 0.06 by 0.08 by 0.5: half a diagonal of the section; a corner touches the round end
-        let corner = |k: u32| -> Ball {
+        let corner = |k: u32| -> BoundingBall {
             let side = |bit: u32, half: f64| if k & bit == 0 { -half } else { half };
             (
                 turn(&turned, &[side(1, 0.03), side(2, 0.04), side(4, 0.25)]),
                 0.0,
             )
         };
-        let corners: Vec<Ball> = (0..8).map(corner).collect();
+        let corners: Vec<BoundingBall> = (0..8).map(corner).collect();
         let (ends, radius) = enclosing(&corners, &[]).expect("eight corners");
         let length = of_pieces(&[ends[0]; 2], &[ends[1]; 2]);
         assert!(
@@ -192,7 +193,8 @@ mod tests {
         let mut chance = ChaCha8Rng::seed_from_u64(3);
         for _ in 0..50 {
             let mut number = || -> f64 { chance.random_range(-1.0..1.0) };
-            let points: Vec<Circle> = (0..30).map(|_| ([number(), 0.3 * number()], 0.0)).collect();
+            let points: Vec<BoundingCircle> =
+                (0..30).map(|_| ([number(), 0.3 * number()], 0.0)).collect();
             let (_, found) = smallest_circle(&points).expect("points");
             // the smallest is that of two or three of them which holds all
             let mut least = f64::INFINITY;
@@ -201,7 +203,8 @@ mod tests {
                     let two = [0.5 * (a.0[0] + b.0[0]), 0.5 * (a.0[1] + b.0[1])];
                     let three = points[j + 1..].iter().filter_map(|c| about(a.0, b.0, c.0));
                     for middle in three.chain([two]) {
-                        let off = |p: &Circle| (p.0[0] - middle[0]).hypot(p.0[1] - middle[1]);
+                        let off =
+                            |p: &BoundingCircle| (p.0[0] - middle[0]).hypot(p.0[1] - middle[1]);
                         least = least.min(points.iter().map(off).fold(0.0, f64::max));
                     }
                 }

@@ -16,7 +16,7 @@ pub const MOST_LINKS: usize = 64;
 
 /// A term A sin(phase + sum k_j q_j) of a dependent coordinate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sine {
+pub struct SineTerm {
     /// A [m or rad].
     pub amplitude: f64,
     /// Phase [rad].
@@ -34,7 +34,7 @@ pub struct DependentCoordinate {
     /// c_j by independent joint.
     pub linear: Vec<(usize, f64)>,
     /// Sines of combinations of the independent joints.
-    pub sines: Vec<Sine>,
+    pub sines: Vec<SineTerm>,
 }
 
 /// What moves a link against the one before it.

@@ -9,8 +9,8 @@ pub mod parameters;
 pub mod pose;
 pub mod space;
 
-pub use base::Grouping;
+pub use base::ParameterGroup;
 pub use links::{
-    Coordinate, DependentCoordinate, Link, MOST_JOINTS, MOST_LINKS, Sine, Tree, TreeError,
+    Coordinate, DependentCoordinate, Link, MOST_JOINTS, MOST_LINKS, SineTerm, Tree, TreeError,
 };
-pub use parameters::{Coupling, Parameters};
+pub use parameters::{JointCoupling, Parameters};

@@ -69,7 +69,7 @@ pub(crate) fn torques(
     walk_with(
         tree,
         state,
-        Forces {
+        TorqueVisitor {
             body,
             tau,
             force,
@@ -79,7 +79,7 @@ pub(crate) fn torques(
 }
 
 /// What is done with the motion of links, one after the other outward.
-trait Visit {
+trait LinkVisitor {
     /// Link i has this motion.
     fn link<const DEPTH: usize>(&mut self, i: usize, state: &State<DEPTH>);
     /// Joint k moves it by w_k and l_k.
@@ -95,7 +95,7 @@ trait Visit {
 /// Hands on the derivatives by the standard parameters.
 struct Rows<F>(F);
 
-impl<F: FnMut(usize, usize, &[f64; STANDARD])> Visit for Rows<F> {
+impl<F: FnMut(usize, usize, &[f64; STANDARD])> LinkVisitor for Rows<F> {
     #[inline(always)]
     fn link<const DEPTH: usize>(&mut self, _: usize, _: &State<DEPTH>) {}
 
@@ -112,7 +112,7 @@ impl<F: FnMut(usize, usize, &[f64; STANDARD])> Visit for Rows<F> {
 }
 
 /// Sums the torques of links with known parameters.
-struct Forces<'a, F> {
+struct TorqueVisitor<'a, F> {
     body: F,
     tau: &'a mut [f64],
     /// Of the link that is visited.
@@ -120,7 +120,7 @@ struct Forces<'a, F> {
     moment: Vector,
 }
 
-impl<F: Fn(usize) -> [f64; STANDARD]> Visit for Forces<'_, F> {
+impl<F: Fn(usize) -> [f64; STANDARD]> LinkVisitor for TorqueVisitor<'_, F> {
     #[inline(always)]
     fn link<const DEPTH: usize>(&mut self, i: usize, state: &State<DEPTH>) {
         let State { w, dw, a, .. } = state;
@@ -151,7 +151,7 @@ impl<F: Fn(usize) -> [f64; STANDARD]> Visit for Forces<'_, F> {
     }
 }
 
-fn walk_with(tree: &Tree, [q, v, a]: [&[f64]; 3], visit: impl Visit) {
+fn walk_with(tree: &Tree, [q, v, a]: [&[f64]; 3], visit: impl LinkVisitor) {
     let n = tree.joints();
     assert!(
         q.len() >= n && v.len() >= n && a.len() >= n,
@@ -178,7 +178,7 @@ fn walk_within<const STATES: usize, const DEPTH: usize>(
     q: &[f64],
     v: &[f64],
     a: &[f64],
-    mut visit: impl Visit,
+    mut visit: impl LinkVisitor,
 ) {
     let mut states = [State::<DEPTH>::AT_REST; STATES];
     let base = State {

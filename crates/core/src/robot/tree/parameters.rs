@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use super::base::{self, Grouping};
+use super::base::{self, ParameterGroup};
 use super::links::Tree;
 use super::newton_euler::{torques, walk};
 use crate::robot::friction::sign;
@@ -18,7 +18,7 @@ use crate::robot::standard::{STANDARD, STANDARD_NAMES};
 /// tau_other += ratio (a a_motor + v v_motor + s sgn(v_motor + ratio v_other)); what either joint
 /// does to itself is in its own drive inertia and friction. The wrist of the TX40 is so, with ratio 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coupling {
+pub struct JointCoupling {
     /// Joint whose motor it is.
     pub motor: usize,
     /// Joint that turns this motor too.
@@ -32,8 +32,8 @@ const OF_COUPLING: [&str; 3] = ["inertia", "viscous", "coulomb"];
 
 /// A coupling, where its parameters begin, and which of [`OF_COUPLING`] is the first of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Train {
-    coupling: Coupling,
+struct GearTrain {
+    coupling: JointCoupling,
     at: usize,
     from: usize,
 }
@@ -43,8 +43,8 @@ struct Train {
 pub struct Parameters {
     /// Names, units and meanings, in the order of the regressor's columns.
     infos: Vec<ParameterInfo>,
-    groupings: Vec<Grouping>,
-    trains: Vec<Train>,
+    groupings: Vec<ParameterGroup>,
+    trains: Vec<GearTrain>,
     /// Per link, which of its ten columns are kept and where they stand.
     kept: Vec<Vec<(usize, usize)>>,
     /// Kept drive inertias: joint, and where the column stands.
@@ -53,7 +53,12 @@ pub struct Parameters {
 
 impl Parameters {
     /// The parameters of a tree whose joints have these names, with or without a drive inertia per joint.
-    pub fn new(tree: &Tree, names: &[String], drive_inertia: bool, couplings: &[Coupling]) -> Self {
+    pub fn new(
+        tree: &Tree,
+        names: &[String],
+        drive_inertia: bool,
+        couplings: &[JointCoupling],
+    ) -> Self {
         let links = tree.links().len();
         let groupings = base::groupings(tree, drive_inertia);
         let mut kept = vec![Vec::new(); links];
@@ -71,12 +76,12 @@ impl Parameters {
                 meaning: in_words(links, grouping).into(),
             });
         }
-        let mut trains: Vec<Train> = Vec::new();
+        let mut trains: Vec<GearTrain> = Vec::new();
         for c in couplings {
-            let pair = |c: &Coupling| (c.motor.min(c.other), c.motor.max(c.other));
+            let pair = |c: &JointCoupling| (c.motor.min(c.other), c.motor.max(c.other));
             let second = trains.iter().any(|t| pair(&t.coupling) == pair(c));
             let from = if second { 2 } else { 0 };
-            trains.push(Train {
+            trains.push(GearTrain {
                 coupling: *c,
                 at: infos.len(),
                 from,
@@ -108,13 +113,13 @@ impl Parameters {
     }
 
     /// How the base parameters are grouped.
-    pub fn groupings(&self) -> &[Grouping] {
+    pub fn groupings(&self) -> &[ParameterGroup] {
         &self.groupings
     }
 
     /// Inertia, viscous and Coulomb of every coupling; 0 where another has it.
     pub fn of_couplings(&self, theta: &[f64]) -> Vec<[f64; 3]> {
-        let of = |train: &Train| {
+        let of = |train: &GearTrain| {
             let mut numbers = [0.0; 3];
             for (k, x) in numbers[train.from..].iter_mut().enumerate() {
                 *x = theta.get(train.at + k).copied().unwrap_or_default();
@@ -160,7 +165,7 @@ impl Parameters {
         for &(joint, at) in &self.drives {
             set(joint, at, a[joint]);
         }
-        for Train {
+        for GearTrain {
             coupling: c,
             at,
             from,
@@ -205,7 +210,7 @@ fn standard_unit(tree: &Tree, index: usize) -> &'static str {
     }
 }
 
-fn coupling_unit(tree: &Tree, coupling: &Coupling, name: &str) -> Cow<'static, str> {
+fn coupling_unit(tree: &Tree, coupling: &JointCoupling, name: &str) -> Cow<'static, str> {
     let kind = tree.joint_kind(coupling.motor);
     match (name, kind) {
         ("inertia", kind) => kind.inertia_unit().into(),
@@ -216,7 +221,7 @@ fn coupling_unit(tree: &Tree, coupling: &Coupling, name: &str) -> Cow<'static, s
 }
 
 /// `mx2 + 0.316 m3 - Iyy2`: the grouping as an engineer writes it.
-fn in_words(links: usize, grouping: &Grouping) -> String {
+fn in_words(links: usize, grouping: &ParameterGroup) -> String {
     let mut out = standard_name(links, grouping.kept);
     for (index, c) in &grouping.terms {
         out += if *c < 0.0 { " - " } else { " + " };

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)]
 
-use cft_ident_core::robot::cft::{ActuationLimits, Setup, pantograph};
+use cft_ident_core::robot::cft::{ActuationLimits, LaboratorySetup, pantograph};
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 
@@ -154,7 +154,7 @@ impl Draw {
 
     /// A state (q, v, a) inside Table 5.
     pub fn state(&mut self) -> ([f64; 4], [f64; 4], [f64; 4]) {
-        let x = self.position(&Setup::Tuedacs.limits());
+        let x = self.position(&LaboratorySetup::Tuedacs.limits());
         let q = pantograph::joints(&x).expect("inside Table 5");
         (q, self.vector(-2.0, 2.0), self.vector(-8.0, 8.0))
     }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use crate::drive::error::DriveError;
-use crate::drive::track::{CommandIs, DriveLoad, DriveLog, PendulumRig, Track};
+use crate::drive::track::{CommandIs, DriveLoad, DriveLog, JointTrack, PendulumRig};
 
 /// What a person gives where a file does not.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -176,7 +176,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
         fact("vin", rig.vin),
     ];
     let zero = rig.offset.unwrap_or(0.0);
-    let track = Track {
+    let track = JointTrack {
         joint: rig.motor.unwrap_or_else(|| "servo".to_owned()),
         command: rig.entries.iter().map(|e| e.goal_position - zero).collect(),
         position: rig.entries.iter().map(|e| e.position - zero).collect(),

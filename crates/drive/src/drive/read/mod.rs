@@ -12,7 +12,7 @@ use cft_ident_logs::log::{self, LogSpec, Provenance, RawBlock, RawReader, Span, 
 
 use super::check;
 use super::error::DriveError;
-use super::track::{CommandIs, DriveLoad, DriveLog, Track};
+use super::track::{CommandIs, DriveLoad, DriveLog, JointTrack};
 use bam::RigGiven;
 
 /// What a person says about logs.
@@ -131,7 +131,7 @@ fn tracks(
     position: Vec<Vec<f64>>,
     command: Vec<Vec<f64>>,
     told: &ReadRequest,
-) -> Result<Vec<Track>, DriveError> {
+) -> Result<Vec<JointTrack>, DriveError> {
     let wide = position.len();
     if !told.joints.is_empty() && told.joints.len() != wide {
         return Err(DriveError::File {
@@ -146,13 +146,13 @@ fn tracks(
     };
     let (kp, kd) = gains(file, told)?;
     let pairs = position.into_iter().zip(command).enumerate();
-    let track = |(j, (position, command))| Track {
+    let track = |(j, (position, command))| JointTrack {
         joint: name(j),
         command,
         position,
         kp,
         kd,
-        ..Track::default()
+        ..JointTrack::default()
     };
     Ok(pairs.map(track).collect())
 }
@@ -174,7 +174,7 @@ fn plain(
     name: &str,
     t: Vec<f64>,
     command_is: CommandIs,
-    joints: Vec<Track>,
+    joints: Vec<JointTrack>,
     told: &ReadRequest,
 ) -> DriveLog {
     let mut facts = Vec::new();
@@ -306,13 +306,13 @@ fn table(spec: &LogSpec, told: &ReadRequest) -> Result<(DriveLog, FileChecksum),
     }
     let (kp, kd) = gains(&file, told)?;
     let mut t = Vec::new();
-    let mut joints: Vec<Track> = pairs
+    let mut joints: Vec<JointTrack> = pairs
         .iter()
-        .map(|(joint, ..)| Track {
+        .map(|(joint, ..)| JointTrack {
             joint: joint.clone(),
             kp,
             kd,
-            ..Track::default()
+            ..JointTrack::default()
         })
         .collect();
     let mut block = RawBlock::default();

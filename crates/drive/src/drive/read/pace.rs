@@ -101,7 +101,7 @@ fn columns(place: &TensorPlace, bytes: &[u8]) -> Result<Vec<Vec<f64>>, String> {
 const MOST_JOINTS: usize = 256;
 
 /// A member of a zip archive.
-struct Member<'a> {
+struct PaceMember<'a> {
     name: String,
     bytes: &'a [u8],
 }
@@ -115,7 +115,7 @@ fn number(bytes: &[u8], at: usize, count: usize) -> Result<usize, String> {
 }
 
 /// Members that are stored as they are, by the directory at the end.
-fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, String> {
+fn members(bytes: &[u8]) -> Result<Vec<PaceMember<'_>>, String> {
     let end = bytes.windows(4).rposition(|four| four == b"PK\x05\x06");
     let end = end.ok_or("is no archive as torch.save writes it")?;
     let mut at = number(bytes, end + 16, 4)?;
@@ -136,7 +136,7 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, String> {
         let body = bytes
             .get(from..from + size)
             .ok_or("the archive is cut off")?;
-        out.push(Member {
+        out.push(PaceMember {
             name: String::from_utf8_lossy(text).into_owned(),
             bytes: body,
         });

@@ -19,15 +19,15 @@ pub struct TensorPlace {
 
 /// What stands on the stack.
 #[derive(Debug, Clone, PartialEq)]
-enum Item {
+enum PickleItem {
     Mark,
     None,
     Bool,
     Int(i64),
     Text(String),
-    Tuple(Vec<Item>),
-    Dict(Vec<(Item, Item)>),
-    Global(Known),
+    Tuple(Vec<PickleItem>),
+    Dict(Vec<(PickleItem, PickleItem)>),
+    Global(PickleGlobal),
     Storage {
         key: String,
         bytes: usize,
@@ -39,7 +39,7 @@ enum Item {
 
 /// Globals that are known.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Known {
+enum PickleGlobal {
     Rebuild,
     Floats(usize),
     Ordered,
@@ -57,10 +57,10 @@ pub fn tensors(bytes: &[u8]) -> Result<Vec<(String, TensorPlace)>, String> {
         memo: HashMap::new(),
     };
     match machine.run()? {
-        Item::Dict(pairs) => {
+        PickleItem::Dict(pairs) => {
             let tensor = |(key, value)| match (key, value) {
-                (Item::Text(key), Item::Tensor(tensor)) => Ok((key, tensor)),
-                (Item::Text(key), _) => Err(format!("`{key}` is no tensor")),
+                (PickleItem::Text(key), PickleItem::Tensor(tensor)) => Ok((key, tensor)),
+                (PickleItem::Text(key), _) => Err(format!("`{key}` is no tensor")),
                 _ => Err("a key is no text".to_owned()),
             };
             pairs.into_iter().map(tensor).collect()
@@ -72,8 +72,8 @@ pub fn tensors(bytes: &[u8]) -> Result<Vec<(String, TensorPlace)>, String> {
 struct Machine<'a> {
     bytes: &'a [u8],
     at: usize,
-    stack: Vec<Item>,
-    memo: HashMap<u32, Item>,
+    stack: Vec<PickleItem>,
+    memo: HashMap<u32, PickleItem>,
 }
 
 impl<'a> Machine<'a> {
@@ -107,13 +107,13 @@ impl<'a> Machine<'a> {
         Ok(line)
     }
 
-    fn pop(&mut self) -> Result<Item, String> {
+    fn pop(&mut self) -> Result<PickleItem, String> {
         self.stack
             .pop()
             .ok_or_else(|| "its stack is empty".to_owned())
     }
 
-    fn push(&mut self, item: Item) -> Result<(), String> {
+    fn push(&mut self, item: PickleItem) -> Result<(), String> {
         if self.stack.len() > MOST {
             return Err("it holds too much".to_owned());
         }
@@ -122,8 +122,11 @@ impl<'a> Machine<'a> {
     }
 
     /// Items above the last mark.
-    fn take_to_mark(&mut self) -> Result<Vec<Item>, String> {
-        let mark = self.stack.iter().rposition(|item| *item == Item::Mark);
+    fn take_to_mark(&mut self) -> Result<Vec<PickleItem>, String> {
+        let mark = self
+            .stack
+            .iter()
+            .rposition(|item| *item == PickleItem::Mark);
         let mark = mark.ok_or("a mark is missing")?;
         let items = self.stack.split_off(mark + 1);
         self.stack.pop();
@@ -148,7 +151,7 @@ impl<'a> Machine<'a> {
         self.push(item)
     }
 
-    fn run(&mut self) -> Result<Item, String> {
+    fn run(&mut self) -> Result<PickleItem, String> {
         loop {
             let code = self.byte()?;
             match code {
@@ -158,11 +161,11 @@ impl<'a> Machine<'a> {
                         return Err(format!("pickle protocol {protocol}, and 2 is read"));
                     }
                 }
-                b'}' => self.push(Item::Dict(Vec::new()))?,
-                b'(' => self.push(Item::Mark)?,
-                b')' => self.push(Item::Tuple(Vec::new()))?,
-                b'N' => self.push(Item::None)?,
-                0x88 | 0x89 => self.push(Item::Bool)?,
+                b'}' => self.push(PickleItem::Dict(Vec::new()))?,
+                b'(' => self.push(PickleItem::Mark)?,
+                b')' => self.push(PickleItem::Tuple(Vec::new()))?,
+                b'N' => self.push(PickleItem::None)?,
+                0x88 | 0x89 => self.push(PickleItem::Bool)?,
                 b'q' => {
                     let key = self.number(1)?;
                     self.put(key)?;
@@ -182,23 +185,23 @@ impl<'a> Machine<'a> {
                 b'X' => {
                     let length = self.number(4)? as usize;
                     let text = String::from_utf8_lossy(self.take(length)?).into_owned();
-                    self.push(Item::Text(text))?;
+                    self.push(PickleItem::Text(text))?;
                 }
                 b'K' => {
                     let x = i64::from(self.number(1)?);
-                    self.push(Item::Int(x))?;
+                    self.push(PickleItem::Int(x))?;
                 }
                 b'M' => {
                     let x = i64::from(self.number(2)?);
-                    self.push(Item::Int(x))?;
+                    self.push(PickleItem::Int(x))?;
                 }
                 b'J' => {
                     let x = i64::from(self.number(4)? as i32);
-                    self.push(Item::Int(x))?;
+                    self.push(PickleItem::Int(x))?;
                 }
                 b't' => {
                     let items = self.take_to_mark()?;
-                    self.push(Item::Tuple(items))?;
+                    self.push(PickleItem::Tuple(items))?;
                 }
                 0x85..=0x87 => {
                     let count = usize::from(code - 0x84);
@@ -208,11 +211,11 @@ impl<'a> Machine<'a> {
                         .checked_sub(count)
                         .ok_or("its stack is empty")?;
                     let items = self.stack.split_off(from);
-                    self.push(Item::Tuple(items))?;
+                    self.push(PickleItem::Tuple(items))?;
                 }
                 b'c' => {
                     let (module, name) = (self.line()?, self.line()?);
-                    self.push(Item::Global(known(&module, &name)?))?;
+                    self.push(PickleItem::Global(known(&module, &name)?))?;
                 }
                 b'Q' => {
                     let storage = storage(self.pop()?)?;
@@ -224,7 +227,7 @@ impl<'a> Machine<'a> {
                 }
                 b'u' => {
                     let items = self.take_to_mark()?;
-                    let Some(Item::Dict(pairs)) = self.stack.last_mut() else {
+                    let Some(PickleItem::Dict(pairs)) = self.stack.last_mut() else {
                         return Err("items are set in what is no dictionary".to_owned());
                     };
                     let mut items = items.into_iter();
@@ -235,7 +238,7 @@ impl<'a> Machine<'a> {
                 b's' => {
                     let (value, key) = (self.pop()?, self.pop()?);
                     match self.stack.last_mut() {
-                        Some(Item::Dict(pairs)) => pairs.push((key, value)),
+                        Some(PickleItem::Dict(pairs)) => pairs.push((key, value)),
                         _ => return Err("an item is set in what is no dictionary".to_owned()),
                     }
                 }
@@ -246,28 +249,28 @@ impl<'a> Machine<'a> {
     }
 }
 
-fn known(module: &str, name: &str) -> Result<Known, String> {
+fn known(module: &str, name: &str) -> Result<PickleGlobal, String> {
     match (module, name) {
-        ("torch._utils", "_rebuild_tensor_v2") => Ok(Known::Rebuild),
-        ("torch", "FloatStorage") => Ok(Known::Floats(4)),
-        ("torch", "DoubleStorage") => Ok(Known::Floats(8)),
-        ("collections", "OrderedDict") => Ok(Known::Ordered),
+        ("torch._utils", "_rebuild_tensor_v2") => Ok(PickleGlobal::Rebuild),
+        ("torch", "FloatStorage") => Ok(PickleGlobal::Floats(4)),
+        ("torch", "DoubleStorage") => Ok(PickleGlobal::Floats(8)),
+        ("collections", "OrderedDict") => Ok(PickleGlobal::Ordered),
         _ => Err(format!("it asks for `{module}.{name}`, which is not read")),
     }
 }
 
 /// The storage that ('storage', type, key, device, count) names.
-fn storage(item: Item) -> Result<Item, String> {
-    let Item::Tuple(items) = item else {
+fn storage(item: PickleItem) -> Result<PickleItem, String> {
+    let PickleItem::Tuple(items) = item else {
         return Err("a storage is not named as torch does".to_owned());
     };
     match items.as_slice() {
         [
-            Item::Text(word),
-            Item::Global(Known::Floats(bytes)),
-            Item::Text(key),
+            PickleItem::Text(word),
+            PickleItem::Global(PickleGlobal::Floats(bytes)),
+            PickleItem::Text(key),
             ..,
-        ] if word == "storage" => Ok(Item::Storage {
+        ] if word == "storage" => Ok(PickleItem::Storage {
             key: key.clone(),
             bytes: *bytes,
         }),
@@ -275,34 +278,34 @@ fn storage(item: Item) -> Result<Item, String> {
     }
 }
 
-fn sizes(item: &Item) -> Result<Vec<usize>, String> {
-    let Item::Tuple(items) = item else {
+fn sizes(item: &PickleItem) -> Result<Vec<usize>, String> {
+    let PickleItem::Tuple(items) = item else {
         return Err("a shape is no tuple".to_owned());
     };
-    let size = |item: &Item| match item {
-        Item::Int(x) => usize::try_from(*x).map_err(|_| "a size is below 0".to_owned()),
+    let size = |item: &PickleItem| match item {
+        PickleItem::Int(x) => usize::try_from(*x).map_err(|_| "a size is below 0".to_owned()),
         _ => Err("a size is no number".to_owned()),
     };
     items.iter().map(size).collect()
 }
 
 /// What a known global makes of arguments.
-fn made(callable: Item, arguments: Item) -> Result<Item, String> {
-    let Item::Tuple(arguments) = arguments else {
+fn made(callable: PickleItem, arguments: PickleItem) -> Result<PickleItem, String> {
+    let PickleItem::Tuple(arguments) = arguments else {
         return Err("arguments are no tuple".to_owned());
     };
     match (callable, arguments.as_slice()) {
-        (Item::Global(Known::Ordered), []) => Ok(Item::Hooks),
+        (PickleItem::Global(PickleGlobal::Ordered), []) => Ok(PickleItem::Hooks),
         (
-            Item::Global(Known::Rebuild),
+            PickleItem::Global(PickleGlobal::Rebuild),
             [
-                Item::Storage { key, bytes },
-                Item::Int(offset),
+                PickleItem::Storage { key, bytes },
+                PickleItem::Int(offset),
                 shape,
                 stride,
                 ..,
             ],
-        ) => Ok(Item::Tensor(TensorPlace {
+        ) => Ok(PickleItem::Tensor(TensorPlace {
             storage: key.clone(),
             bytes: *bytes,
             offset: usize::try_from(*offset).map_err(|_| "an offset is below 0")?,

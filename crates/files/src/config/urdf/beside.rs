@@ -1,7 +1,7 @@
 //! A model file that takes its links and their inertials from a URDF beside it.
 
 use crate::config::ConfigError;
-use crate::config::document::Document;
+use crate::config::document::TomlDocument;
 use crate::config::model_file::Parameter;
 use crate::config::robot_file::RobotFile;
 use cft_ident_core::robot::standard::STANDARD;
@@ -13,7 +13,7 @@ pub const DRIVE_INERTIA: &str = "drive_inertia";
 pub(in crate::config) fn base_parameters(
     robot: &RobotFile,
     parameters: &mut Vec<Parameter>,
-    document: &Document,
+    document: &TomlDocument,
 ) -> Result<(), ConfigError> {
     let described = robot.robot();
     let mut standard = vec![0.0; described.standard_parameters()];

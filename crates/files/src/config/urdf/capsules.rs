@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use super::shapes::Form;
-use super::{Collision, UrdfChain, mesh};
+use super::shapes::ShapeForm;
+use super::{CollisionShape, UrdfChain, mesh};
 use crate::config::check_limits::MOST_CAPSULES;
 use crate::config::limits::CapsuleSection;
 use cft_ident_core::number::is_usable;
-use cft_ident_core::robot::tree::enclosing::{Ball, EnclosedPiece, enclosing, volume};
+use cft_ident_core::robot::tree::enclosing::{BoundingBall, EnclosedPiece, enclosing, volume};
 use cft_ident_core::robot::tree::space::{UNTURNED, Vector};
 use cft_ident_logs::log::escape;
 
 /// What a robot file declares of collision shapes.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Capsules {
+pub struct DeclaredCapsules {
     /// In the order of the links.
     pub sections: Vec<CapsuleSection>,
     /// Links of the URDF with shapes that no capsule holds.
@@ -23,7 +23,7 @@ pub struct Capsules {
 }
 
 /// The capsules of one link.
-struct Held {
+struct LinkCapsules {
     link: String,
     each: Vec<EnclosedPiece>,
     /// One that holds all.
@@ -36,23 +36,24 @@ impl UrdfChain {
     ///
     /// Each shape has its own, but where one about all shapes of a link is as small as theirs together, or where they
     /// are more than a robot file takes.
-    pub fn capsules(&self, urdf: &Path) -> Capsules {
+    pub fn capsules(&self, urdf: &Path) -> DeclaredCapsules {
         let folder = urdf
             .parent()
             .filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new("."));
-        let (mut left, mut out) = (mesh::MOST_BYTES_OF_ALL, Capsules::default());
-        let mut held: Vec<Held> = Vec::new();
+        let (mut left, mut out) = (mesh::MOST_BYTES_OF_ALL, DeclaredCapsules::default());
+        let mut held: Vec<LinkCapsules> = Vec::new();
         for first in &self.collisions {
             if held.iter().all(|held| held.link != first.on) {
                 let own = self.collisions.iter().filter(|of| of.on == first.on);
                 held.push(of_link(&first.on, own, folder, &mut left, &mut out));
             }
         }
-        let count = |held: &[Held]| -> usize { held.iter().map(|held| held.each.len()).sum() };
+        let count =
+            |held: &[LinkCapsules]| -> usize { held.iter().map(|held| held.each.len()).sum() };
         while count(&held) > MOST_CAPSULES {
             let most = held.iter_mut().max_by_key(|held| held.each.len());
-            let Some(Held {
+            let Some(LinkCapsules {
                 each,
                 all: Some(all),
                 ..
@@ -79,12 +80,12 @@ impl UrdfChain {
 /// The capsules of a link with these shapes; what has none is reported in `out`.
 fn of_link<'c>(
     link: &str,
-    collisions: impl Iterator<Item = &'c Collision>,
+    collisions: impl Iterator<Item = &'c CollisionShape>,
     folder: &Path,
     left: &mut u64,
-    out: &mut Capsules,
-) -> Held {
-    let (mut balls, mut each): (Vec<Ball>, Vec<EnclosedPiece>) = (Vec::new(), Vec::new());
+    out: &mut DeclaredCapsules,
+) -> LinkCapsules {
+    let (mut balls, mut each): (Vec<BoundingBall>, Vec<EnclosedPiece>) = (Vec::new(), Vec::new());
     for collision in collisions {
         let begin = balls.len();
         match add(collision, folder, left, &mut balls) {
@@ -106,7 +107,7 @@ fn of_link<'c>(
     {
         each = vec![all];
     }
-    Held {
+    LinkCapsules {
         link: link.to_owned(),
         each,
         all,
@@ -115,20 +116,20 @@ fn of_link<'c>(
 
 /// Adds a shape as balls, and gives the capsule that holds it.
 fn add(
-    collision: &Collision,
+    collision: &CollisionShape,
     folder: &Path,
     left: &mut u64,
-    balls: &mut Vec<Ball>,
+    balls: &mut Vec<BoundingBall>,
 ) -> Result<Option<EnclosedPiece>, String> {
     let unreadable = || "a shape that cannot be read".to_owned();
     let shape = collision.shape.as_ref().ok_or_else(unreadable)?;
     Ok(match &shape.form {
-        Form::Within((ends, radius)) => {
+        ShapeForm::Within((ends, radius)) => {
             let ends = ends.map(|end| shape.place(&end));
             balls.extend(ends.map(|end| (end, *radius)));
             Some((ends, *radius))
         }
-        Form::Mesh(file, scale) => {
+        ShapeForm::Mesh(file, scale) => {
             let vertices = mesh::read(file, folder, left)?;
             let begin = balls.len();
             let scaled = |x: &Vector| std::array::from_fn(|k| scale[k] * x[k]);

@@ -1,7 +1,7 @@
 //! A link as a URDF has it.
 
-use super::Place;
-use super::shapes::Shape;
+use super::UrdfPlace;
+use super::shapes::LinkShape;
 use crate::config::ConfigError;
 use cft_ident_core::robot::tree::space::{Rotation, Vector};
 use cft_ident_logs::log::escape;
@@ -22,11 +22,11 @@ pub(super) struct Link {
     pub name: String,
     pub line: usize,
     pub body: Option<Body>,
-    pub shapes: Vec<Option<Shape>>,
+    pub shapes: Vec<Option<LinkShape>>,
 }
 
 impl Link {
-    pub(super) fn wrong(&self, place: &Place, problem: &str, remedy: &str) -> ConfigError {
+    pub(super) fn wrong(&self, place: &UrdfPlace, problem: &str, remedy: &str) -> ConfigError {
         let what = format!("link {}", escape(&self.name));
         place.wrong(self.line, &what, problem, remedy)
     }

@@ -20,13 +20,13 @@ mod xml;
 use std::path::Path;
 
 use super::ConfigError;
-use super::document::Document;
+use super::document::TomlDocument;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
 use super::serial_section::{FrameSection, LinkSection};
 use super::text_file::text_of;
 use cft_ident_core::robot::tree::space::{Rotation, product};
 use cft_ident_logs::log::{named_beside, remedy, shown};
-use shapes::Shape;
+use shapes::LinkShape;
 
 /// What a URDF gives to a robot file.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,37 +38,37 @@ pub struct UrdfChain {
     /// Links that fixed joints hang on moving ones, by their placement alone.
     pub frames: Vec<FrameSection>,
     /// Collision shapes, for [`capsules`].
-    collisions: Vec<Collision>,
+    collisions: Vec<CollisionShape>,
     /// What was taken otherwise than it is written, one sentence each.
     pub notes: Vec<String>,
 }
 
 /// A collision shape of a link.
 #[derive(Debug, Clone, PartialEq)]
-struct Collision {
+struct CollisionShape {
     /// The link of the URDF.
     of: String,
     /// The moving link, or the base, that it belongs to.
     on: String,
     /// In the frame of that; `None` where it cannot be read.
-    shape: Option<Shape>,
+    shape: Option<LinkShape>,
 }
 
 /// How angles and axes are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Angles {
+pub(super) enum AngleConvention {
     /// 1.5708 as pi/2.
     Meant,
     Written,
 }
 
 /// The URDF that errors speak of.
-pub(super) struct Place<'a> {
+pub(super) struct UrdfPlace<'a> {
     file: &'a str,
-    angles: Angles,
+    angles: AngleConvention,
 }
 
-impl Place<'_> {
+impl UrdfPlace<'_> {
     fn wrong(&self, line: usize, what: &str, problem: &str, remedy: &str) -> ConfigError {
         ConfigError::Value {
             file: self.file.to_owned(),
@@ -87,7 +87,7 @@ fn turned(r: &Rotation, a: &Rotation) -> Rotation {
 }
 
 /// The error for a text that is no XML.
-fn no_xml(file: &str, wrong: xml::Malformed) -> ConfigError {
+fn no_xml(file: &str, wrong: xml::MalformedText) -> ConfigError {
     ConfigError::Syntax {
         file: file.to_owned(),
         line: wrong.line,
@@ -103,27 +103,31 @@ impl UrdfChain {
     /// [`ConfigError::Syntax`] where it is no well-formed XML, [`ConfigError::Value`] with the line
     /// of the link or joint that cannot be used.
     pub fn parse(file: &str, text: &str, tip: Option<&str>) -> Result<Self, ConfigError> {
-        Self::parse_with(file, text, tip, Angles::Meant)
+        Self::parse_with(file, text, tip, AngleConvention::Meant)
     }
 
     fn parse_with(
         file: &str,
         text: &str,
         tip: Option<&str>,
-        angles: Angles,
+        angles: AngleConvention,
     ) -> Result<Self, ConfigError> {
         let text = xml::without_comments(text);
         let tree = xml::Tree::parse(&text).map_err(|wrong| no_xml(file, wrong))?;
-        let place = Place { file, angles };
+        let place = UrdfPlace { file, angles };
         tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)
     }
 
     /// Reads a URDF file.
     pub fn load(path: &Path, tip: Option<&str>) -> Result<Self, ConfigError> {
-        Self::load_with(path, tip, Angles::Meant)
+        Self::load_with(path, tip, AngleConvention::Meant)
     }
 
-    fn load_with(path: &Path, tip: Option<&str>, angles: Angles) -> Result<Self, ConfigError> {
+    fn load_with(
+        path: &Path,
+        tip: Option<&str>,
+        angles: AngleConvention,
+    ) -> Result<Self, ConfigError> {
         let file = shown(path);
         let text = text_of(path).map_err(|source| ConfigError::Read {
             file: file.clone(),
@@ -146,7 +150,7 @@ impl UrdfChain {
 /// Reads the URDF that a robot file names into its links and limits, so that the file stands alone.
 pub(super) fn resolve(
     file: &mut RobotFile,
-    document: &Document,
+    document: &TomlDocument,
     folder: Option<&Path>,
 ) -> Result<(), ConfigError> {
     let robot = &mut file.robot;
@@ -173,8 +177,8 @@ pub(super) fn resolve(
         ));
     };
     let angles = match robot.angles_as_written {
-        Some(true) => Angles::Written,
-        _ => Angles::Meant,
+        Some(true) => AngleConvention::Written,
+        _ => AngleConvention::Meant,
     };
     let chain = UrdfChain::load_with(&folder.join(urdf), robot.tip.as_deref(), angles)?;
     file.notes.0.extend(chain.notes);

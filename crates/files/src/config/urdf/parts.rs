@@ -7,17 +7,18 @@ use super::link::{Body, Link};
 use super::possible;
 use super::shapes::{numbers, of_link};
 use super::xml::{EXPAND, Element, MACRO};
-use super::{Angles, Place};
+use super::{AngleConvention, UrdfPlace};
 use crate::config::ConfigError;
-use crate::config::angles::Changes;
+use crate::config::angles::FileChanges;
 use crate::config::document::is_plain_name;
 use crate::config::robot_file::CoordinateLimits;
 use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::tree::space::{Vector, of_roll_pitch_yaw};
 use cft_ident_logs::log::{escape, list, nearest};
 
+/// The types of joints that a URDF knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum UrdfJointKind {
     Fixed,
     Revolute,
     Continuous,
@@ -26,18 +27,19 @@ pub(super) enum Kind {
     Planar,
 }
 
-/// The names of joint types, in the order of [`Kind`].
-const KINDS: [(&str, Kind); 6] = [
-    ("fixed", Kind::Fixed),
-    ("revolute", Kind::Revolute),
-    ("continuous", Kind::Continuous),
-    ("prismatic", Kind::Prismatic),
-    ("floating", Kind::Floating),
-    ("planar", Kind::Planar),
+/// The names of joint types, in the order of [`UrdfJointKind`].
+const KINDS: [(&str, UrdfJointKind); 6] = [
+    ("fixed", UrdfJointKind::Fixed),
+    ("revolute", UrdfJointKind::Revolute),
+    ("continuous", UrdfJointKind::Continuous),
+    ("prismatic", UrdfJointKind::Prismatic),
+    ("floating", UrdfJointKind::Floating),
+    ("planar", UrdfJointKind::Planar),
 ];
 
+/// The joint that another one follows: position = multiplier * that of `joint` + offset.
 #[derive(Debug)]
-pub(super) struct Mimic {
+pub(super) struct MimicJoint {
     pub joint: String,
     pub multiplier: f64,
     pub offset: f64,
@@ -47,18 +49,18 @@ pub(super) struct Mimic {
 pub(super) struct Joint {
     pub name: String,
     pub line: usize,
-    pub kind: Kind,
+    pub kind: UrdfJointKind,
     pub parent: String,
     pub child: String,
     pub xyz: Vector,
     pub rpy: Vector,
     pub axis: Vector,
     pub limits: CoordinateLimits,
-    pub mimic: Option<Mimic>,
+    pub mimic: Option<MimicJoint>,
 }
 
 impl Joint {
-    pub(super) fn wrong(&self, place: &Place, problem: &str, remedy: &str) -> ConfigError {
+    pub(super) fn wrong(&self, place: &UrdfPlace, problem: &str, remedy: &str) -> ConfigError {
         let what = format!("joint {}", escape(&self.name));
         place.wrong(self.line, &what, problem, remedy)
     }
@@ -66,11 +68,11 @@ impl Joint {
 
 /// A robot as its URDF lists it.
 #[derive(Debug, Default)]
-pub(super) struct Parts {
+pub(super) struct UrdfParts {
     pub links: Vec<Link>,
     pub joints: Vec<Joint>,
     /// Angles and axes that were taken for what they stand for.
-    pub changes: Changes,
+    pub changes: FileChanges,
     /// What was said of inertials that no body has.
     pub impossible: Option<String>,
     /// Joints whose names are written otherwise here, as the URDF has them.
@@ -78,7 +80,7 @@ pub(super) struct Parts {
 }
 
 /// Reads what stands in a `<robot>`.
-pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> {
+pub(super) fn parts(root: Element, place: &UrdfPlace) -> Result<UrdfParts, ConfigError> {
     if root.name() != "robot" {
         return Err(place.wrong(
             root.line(),
@@ -87,7 +89,7 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
             "give a URDF file; an SDF or a xacro file is to be converted first",
         ));
     }
-    let mut parts = Parts::default();
+    let mut parts = UrdfParts::default();
     let mut links: BTreeMap<&str, usize> = BTreeMap::new();
     let mut joints: BTreeMap<&str, usize> = BTreeMap::new();
     for child in root.children() {
@@ -154,7 +156,7 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
 }
 
 /// The one undeclared parent (`world`) where every declared link hangs on something; else it is a slip of the pen.
-fn undeclared_root(parts: &Parts, declared: &BTreeMap<&str, usize>) -> Option<Link> {
+fn undeclared_root(parts: &UrdfParts, declared: &BTreeMap<&str, usize>) -> Option<Link> {
     let mut undeclared = (parts.joints.iter()).filter(|j| !declared.contains_key(&*j.parent));
     let first = undeclared.next()?;
     let alone = undeclared.all(|other| other.parent == first.parent);
@@ -177,8 +179,8 @@ pub(super) fn instead_of(link: &str, links: &[Link]) -> String {
     }
 }
 
-fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError> {
-    let at = Reading {
+fn link(element: Element, name: &str, place: &UrdfPlace) -> Result<Link, ConfigError> {
+    let at = ElementReading {
         place,
         what: format!("link {}", escape(name)),
     };
@@ -214,10 +216,10 @@ fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError
 fn joint(
     element: Element,
     name: &str,
-    place: &Place,
-    changes: &mut Changes,
+    place: &UrdfPlace,
+    changes: &mut FileChanges,
 ) -> Result<Joint, ConfigError> {
-    let at = Reading {
+    let at = ElementReading {
         place,
         what: format!("joint {}", escape(name)),
     };
@@ -240,7 +242,7 @@ fn joint(
         None => [1.0, 0.0, 0.0],
         Some(axis) => at.vector(axis, "xyz", [1.0, 0.0, 0.0])?,
     };
-    if place.angles == Angles::Meant {
+    if place.angles == AngleConvention::Meant {
         let written = |child: &str, key| words(element.child(child)?.attribute(key)?);
         if let Some(written) = written("origin", "rpy") {
             for (angle, written) in rpy.iter_mut().zip(written) {
@@ -251,7 +253,7 @@ fn joint(
             axis = changes.axis(axis, written, &format!("axis of {}", at.what));
         }
     }
-    let moving = !matches!(kind, Kind::Fixed | Kind::Floating);
+    let moving = !matches!(kind, UrdfJointKind::Fixed | UrdfJointKind::Floating);
     if moving && axis.iter().all(|x| x.abs() < 1e-6) {
         let remedy = "give an axis, e.g. xyz=\"0 0 1\"";
         return Err(at.wrong(element, "has an axis without length", remedy));
@@ -288,12 +290,12 @@ fn words(text: &str) -> Option<[&str; 3]> {
 }
 
 /// The reading of one link or joint, which errors name.
-struct Reading<'a> {
-    place: &'a Place<'a>,
+struct ElementReading<'a> {
+    place: &'a UrdfPlace<'a>,
     what: String,
 }
 
-impl Reading<'_> {
+impl ElementReading<'_> {
     fn wrong(&self, element: Element, problem: &str, remedy: &str) -> ConfigError {
         self.place
             .wrong(element.line(), &self.what, problem, remedy)
@@ -352,7 +354,7 @@ impl Reading<'_> {
     }
 
     /// The limits of a joint, where they are given; 0 stands in many files for one that nobody knows.
-    fn limits(&self, joint: Element, kind: Kind) -> Result<CoordinateLimits, ConfigError> {
+    fn limits(&self, joint: Element, kind: UrdfJointKind) -> Result<CoordinateLimits, ConfigError> {
         let Some(limit) = joint.child("limit") else {
             return Ok(CoordinateLimits::default());
         };
@@ -364,19 +366,19 @@ impl Reading<'_> {
             return Err(self.wrong(limit, &problem, "exchange the two"));
         }
         Ok(CoordinateLimits {
-            position: (low < high && kind != Kind::Continuous).then_some([low, high]),
+            position: (low < high && kind != UrdfJointKind::Continuous).then_some([low, high]),
             speed: (speed > 0.0).then_some(speed),
             torque: (effort > 0.0).then_some(effort),
             ..CoordinateLimits::default()
         })
     }
 
-    fn mimic(&self, joint: Element) -> Result<Option<Mimic>, ConfigError> {
+    fn mimic(&self, joint: Element) -> Result<Option<MimicJoint>, ConfigError> {
         let Some(mimic) = joint.child("mimic") else {
             return Ok(None);
         };
         let followed = mimic.attribute("joint");
-        Ok(Some(Mimic {
+        Ok(Some(MimicJoint {
             joint: clean_name(followed.ok_or_else(|| self.lacks(mimic, "joint"))?).into_owned(),
             multiplier: self.number(mimic, "multiplier", Some(1.0))?,
             offset: self.number(mimic, "offset", Some(0.0))?,

@@ -7,21 +7,22 @@ use cft_ident_core::robot::tree::space::{Rotation, Vector, add, of_roll_pitch_ya
 
 /// A shape in the frame of its link.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Shape {
-    pub form: Form,
+pub(super) struct LinkShape {
+    pub form: ShapeForm,
     pub rotation: Rotation,
     pub origin: Vector,
 }
 
+/// What a shape is: a box around it, or the name of a mesh with its scale.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Form {
+pub(super) enum ShapeForm {
     /// A capsule that holds it.
     Within(EnclosedPiece),
     /// The mesh of a file, as the URDF names it, and the factors of its coordinates.
     Mesh(String, Vector),
 }
 
-impl Shape {
+impl LinkShape {
     /// The same shape seen from a frame in which its own lies so.
     pub(super) fn seen_from(&self, rotation: &Rotation, origin: &Vector) -> Self {
         Self {
@@ -38,24 +39,24 @@ impl Shape {
 }
 
 /// The shapes of a `<link>`; `None` for one that cannot be read: collision shapes decide no torque, and spoil no file.
-pub(super) fn of_link(link: Element) -> Vec<Option<Shape>> {
+pub(super) fn of_link(link: Element) -> Vec<Option<LinkShape>> {
     let collisions = link.children().filter(|c| c.name() == "collision");
     collisions.map(shape).collect()
 }
 
-fn shape(collision: Element) -> Option<Shape> {
+fn shape(collision: Element) -> Option<LinkShape> {
     let at = |key: &str| match collision.child("origin").and_then(|o| o.attribute(key)) {
         Some(text) => numbers(text),
         None => Some([0.0; 3]),
     };
-    Some(Shape {
+    Some(LinkShape {
         form: form(collision.child("geometry")?.children().next()?)?,
         rotation: of_roll_pitch_yaw(&at("rpy")?),
         origin: at("xyz")?,
     })
 }
 
-fn form(shape: Element) -> Option<Form> {
+fn form(shape: Element) -> Option<ShapeForm> {
     let size = |key: &str| {
         let value = shape.attribute(key)?.trim().parse::<f64>().ok();
         value.filter(|x| is_usable(*x) && *x > 0.0)
@@ -74,7 +75,10 @@ fn form(shape: Element) -> Option<Form> {
         }
         "mesh" => {
             let scale = shape.attribute("scale").map_or(Some([1.0; 3]), numbers);
-            return Some(Form::Mesh(shape.attribute("filename")?.to_owned(), scale?));
+            return Some(ShapeForm::Mesh(
+                shape.attribute("filename")?.to_owned(),
+                scale?,
+            ));
         }
         _ => return None,
     };
@@ -83,7 +87,7 @@ fn form(shape: Element) -> Option<Form> {
         end[axis] = along;
         end
     };
-    Some(Form::Within(([end(-half), end(half)], radius)))
+    Some(ShapeForm::Within(([end(-half), end(half)], radius)))
 }
 
 /// The three numbers of a text.

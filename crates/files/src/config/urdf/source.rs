@@ -9,7 +9,7 @@ use crate::config::ConfigError;
 
 /// What is to stand in a URDF.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Replacement {
+pub struct UrdfEdits {
     /// `<inertial>` elements by link.
     pub inertials: BTreeMap<String, String>,
     /// Links whose inertia is in another one: theirs goes.
@@ -24,7 +24,7 @@ pub struct Replacement {
 ///
 /// # Errors
 /// [`ConfigError::Syntax`] where it is no well-formed XML.
-pub fn replaced(file: &str, text: &str, with: &Replacement) -> Result<String, ConfigError> {
+pub fn replaced(file: &str, text: &str, with: &UrdfEdits) -> Result<String, ConfigError> {
     // comments become as many spaces, so that places are those of the text
     let plain = xml::without_comments(text);
     let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
@@ -84,7 +84,7 @@ mod tests {
                     <link name=\"a\"/>\n  <link name=\"b\"><visual><mesh name='x>y'/></visual><inertial>old</inertial></link>\n  \
                     <link name=\"tool\"><inertial>lumped</inertial></link>\n  \
                     <joint name=\"j\" type=\"revolute\"><dynamics damping=\"9\"/><limit/></joint>\n</robot>\n";
-        let with = Replacement {
+        let with = UrdfEdits {
             inertials: BTreeMap::from([
                 ("a", "<inertial>1</inertial>"),
                 ("b", "<inertial>2</inertial>"),

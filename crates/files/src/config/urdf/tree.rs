@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::link::{Body, Link};
-use super::parts::{Joint, Kind, Parts, instead_of};
-use super::{Collision, Place, UrdfChain, turned};
+use super::parts::{Joint, UrdfJointKind, UrdfParts, instead_of};
+use super::{CollisionShape, UrdfChain, UrdfPlace, turned};
 use crate::config::ConfigError;
 use crate::config::document::is_plain_name;
 use crate::config::robot_file::CoordinateLimits;
@@ -19,7 +19,7 @@ use cft_ident_logs::log::{escape, list};
 
 /// Where a link of the URDF is: in which moving link, and how it lies there.
 #[derive(Clone, Copy)]
-struct Seat {
+struct LinkSeat {
     /// Index of the moving link; `None` for the base.
     on: Option<usize>,
     rotation: Rotation,
@@ -28,7 +28,7 @@ struct Seat {
     rpy: Option<Vector>,
 }
 
-impl Seat {
+impl LinkSeat {
     /// In the frame of a moving link, or of the base.
     fn at(on: Option<usize>) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Seat {
 }
 
 /// A moving link that is being gathered.
-struct Moving<'a> {
+struct MovingLink<'a> {
     joint: &'a Joint,
     section: LinkSection,
     bodies: Vec<Body>,
@@ -49,9 +49,9 @@ struct Moving<'a> {
 
 /// The moving links of a URDF, up to `tip` where one is named.
 pub(super) fn chain(
-    parts: &Parts,
+    parts: &UrdfParts,
     tip: Option<&str>,
-    place: &Place,
+    place: &UrdfPlace,
 ) -> Result<UrdfChain, ConfigError> {
     let named = parts.links.iter().enumerate();
     let index: BTreeMap<&str, usize> = named.map(|(i, link)| (link.name.as_str(), i)).collect();
@@ -61,11 +61,11 @@ pub(super) fn chain(
         Some(tip) => path_to(parts, &index, &before, tip, place)?,
     };
     let mut reached = vec![false; parts.links.len()];
-    let mut moving: Vec<Moving> = Vec::new();
-    let mut fixed: Vec<(&str, Seat)> = Vec::new();
+    let mut moving: Vec<MovingLink> = Vec::new();
+    let mut fixed: Vec<(&str, LinkSeat)> = Vec::new();
     let mut collisions = Vec::new();
     // links to visit, the next one last; a link stands here once, for it has one joint before it
-    let mut next: Vec<(Option<usize>, usize, Seat)> = vec![(None, root, Seat::at(None))];
+    let mut next: Vec<(Option<usize>, usize, LinkSeat)> = vec![(None, root, LinkSeat::at(None))];
     while let Some((joint, link, parent)) = next.pop() {
         let seat = match joint.map(|j| &parts.joints[j]) {
             None => parent,
@@ -80,12 +80,13 @@ pub(super) fn chain(
         }
         let on = hangs_on(&moving, seat.on);
         let shapes = parts.links[link].shapes.iter();
-        collisions.extend(shapes.map(|shape| Collision {
+        collisions.extend(shapes.map(|shape| CollisionShape {
             of: parts.links[link].name.clone(),
             on: on.clone(),
             shape: (shape.as_ref()).map(|shape| shape.seen_from(&seat.rotation, &seat.origin)),
         }));
-        if joint.is_some_and(|j| parts.joints[j].kind == Kind::Fixed) && seat.on.is_some() {
+        if joint.is_some_and(|j| parts.joints[j].kind == UrdfJointKind::Fixed) && seat.on.is_some()
+        {
             fixed.push((&parts.links[link].name, seat));
         }
         reached[link] = true;
@@ -121,9 +122,9 @@ pub(super) fn chain(
 type JointsOfLinks = (Vec<Option<usize>>, Vec<Vec<(usize, usize)>>);
 
 fn joints_of_links(
-    parts: &Parts,
+    parts: &UrdfParts,
     index: &BTreeMap<&str, usize>,
-    place: &Place,
+    place: &UrdfPlace,
 ) -> Result<JointsOfLinks, ConfigError> {
     let mut before: Vec<Option<usize>> = vec![None; parts.links.len()];
     let mut behind: Vec<Vec<(usize, usize)>> = vec![Vec::new(); parts.links.len()];
@@ -153,7 +154,7 @@ fn joints_of_links(
 }
 
 /// The frames that are fixed to moving links. A name that a moving link has taken gets an ending.
-fn frames(fixed: &[(&str, Seat)], moving: &[Moving]) -> Vec<FrameSection> {
+fn frames(fixed: &[(&str, LinkSeat)], moving: &[MovingLink]) -> Vec<FrameSection> {
     let links = moving.iter().filter_map(|m| m.section.name.as_deref());
     let mut taken: BTreeSet<String> = links.map(str::to_owned).collect();
     taken.insert(BASE.to_owned());
@@ -177,7 +178,7 @@ fn frames(fixed: &[(&str, Seat)], moving: &[Moving]) -> Vec<FrameSection> {
 }
 
 /// The error for links that hang on each other in a circle.
-fn circle(link: &Link, place: &Place) -> ConfigError {
+fn circle(link: &Link, place: &UrdfPlace) -> ConfigError {
     link.wrong(
         place,
         "hangs on itself through its joints",
@@ -187,11 +188,11 @@ fn circle(link: &Link, place: &Place) -> ConfigError {
 
 /// Which joints are on the way to the link `tip`, and the root that the way begins at.
 fn path_to(
-    parts: &Parts,
+    parts: &UrdfParts,
     index: &BTreeMap<&str, usize>,
     before: &[Option<usize>],
     tip: &str,
-    place: &Place,
+    place: &UrdfPlace,
 ) -> Result<(Vec<bool>, usize), ConfigError> {
     let Some(&end) = index.get(tip) else {
         let remedy = instead_of(tip, &parts.links);
@@ -214,7 +215,11 @@ fn path_to(
 }
 
 /// The link that no joint moves.
-fn root(parts: &Parts, before: &[Option<usize>], place: &Place) -> Result<usize, ConfigError> {
+fn root(
+    parts: &UrdfParts,
+    before: &[Option<usize>],
+    place: &UrdfPlace,
+) -> Result<usize, ConfigError> {
     let roots: Vec<usize> = (0..before.len()).filter(|l| before[*l].is_none()).collect();
     match roots[..] {
         [root] => Ok(root),
@@ -234,23 +239,23 @@ fn root(parts: &Parts, before: &[Option<usize>], place: &Place) -> Result<usize,
 fn sit<'a>(
     joint: &'a Joint,
     link: &str,
-    parent: Seat,
-    moving: &mut Vec<Moving<'a>>,
-    place: &Place,
-) -> Result<Seat, ConfigError> {
+    parent: LinkSeat,
+    moving: &mut Vec<MovingLink<'a>>,
+    place: &UrdfPlace,
+) -> Result<LinkSeat, ConfigError> {
     // an origin that nothing was lumped into is kept to the last digit
     let unmoved = parent.rotation == UNTURNED && parent.origin == [0.0; 3];
-    let here = Seat {
+    let here = LinkSeat {
         on: parent.on,
         rotation: product(&parent.rotation, &of_roll_pitch_yaw(&joint.rpy)),
         origin: add(&parent.origin, &turn(&parent.rotation, &joint.xyz)),
         rpy: unmoved.then_some(joint.rpy),
     };
     let kind = match joint.kind {
-        Kind::Fixed => return Ok(here),
-        Kind::Revolute | Kind::Continuous => JointKind::Revolute,
-        Kind::Prismatic => JointKind::Prismatic,
-        Kind::Floating | Kind::Planar => {
+        UrdfJointKind::Fixed => return Ok(here),
+        UrdfJointKind::Revolute | UrdfJointKind::Continuous => JointKind::Revolute,
+        UrdfJointKind::Prismatic => JointKind::Prismatic,
+        UrdfJointKind::Floating | UrdfJointKind::Planar => {
             return Err(joint.wrong(
                 place,
                 "is floating or planar, and its torques cannot be logged",
@@ -287,16 +292,16 @@ fn sit<'a>(
         axis: (joint.axis != [0.0, 0.0, 1.0]).then_some(joint.axis),
         ..LinkSection::default()
     };
-    moving.push(Moving {
+    moving.push(MovingLink {
         joint,
         section,
         bodies: Vec::new(),
     });
-    Ok(Seat::at(Some(at)))
+    Ok(LinkSeat::at(Some(at)))
 }
 
 /// The name of a moving link, or of the base.
-fn hangs_on(moving: &[Moving], on: Option<usize>) -> String {
+fn hangs_on(moving: &[MovingLink], on: Option<usize>) -> String {
     match on {
         None => BASE.to_owned(),
         Some(on) => moving[on].section.name.clone().unwrap_or_default(),
@@ -304,8 +309,8 @@ fn hangs_on(moving: &[Moving], on: Option<usize>) -> String {
 }
 
 /// The name of a link; `base` is taken by what stands still.
-fn unused(link: &str, moving: &[Moving]) -> String {
-    let is = |name: &str, m: &Moving| m.section.name.as_deref() == Some(name);
+fn unused(link: &str, moving: &[MovingLink]) -> String {
+    let is = |name: &str, m: &MovingLink| m.section.name.as_deref() == Some(name);
     let taken = |name: &str| name == BASE || moving.iter().any(|m| is(name, m));
     let mut name = link.to_owned();
     while taken(&name) {
@@ -315,7 +320,7 @@ fn unused(link: &str, moving: &[Moving]) -> String {
 }
 
 /// What was taken otherwise than it is written.
-fn notes(parts: &Parts, place: &Place) -> Vec<String> {
+fn notes(parts: &UrdfParts, place: &UrdfPlace) -> Vec<String> {
     let renamed = parts.renamed.first().map(|_| {
         let names = parts.renamed.iter().map(String::as_str);
         format!(
@@ -332,9 +337,9 @@ fn notes(parts: &Parts, place: &Place) -> Vec<String> {
 
 /// Lumps the bodies and lets mimic joints follow.
 fn finish(
-    mut moving: Vec<Moving>,
+    mut moving: Vec<MovingLink>,
     frames: Vec<FrameSection>,
-    place: &Place,
+    place: &UrdfPlace,
 ) -> Result<UrdfChain, ConfigError> {
     let joints: BTreeMap<&str, &Joint> = (moving.iter())
         .map(|m| (m.joint.name.as_str(), m.joint))
@@ -364,8 +369,8 @@ fn finish(
 fn followed(
     joint: &Joint,
     joints: &BTreeMap<&str, &Joint>,
-    moving: &[Moving],
-    place: &Place,
+    moving: &[MovingLink],
+    place: &UrdfPlace,
 ) -> Result<Option<FollowsSection>, ConfigError> {
     let (mut at, mut factor, mut offset) = (joint, 1.0, 0.0);
     // a mimic joint may follow another one; a circle of them is longer than there are joints
@@ -407,7 +412,7 @@ fn followed(
 fn lumped(
     bodies: &[Body],
     joint: &Joint,
-    place: &Place,
+    place: &UrdfPlace,
 ) -> Result<Option<InertialSection>, ConfigError> {
     let one = match bodies {
         [] => return Ok(None),

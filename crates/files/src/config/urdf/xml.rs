@@ -45,7 +45,7 @@ pub(super) fn without_comments(text: &str) -> Cow<'_, str> {
 
 /// What is wrong with a text, and where.
 #[derive(Debug)]
-pub(super) struct Malformed {
+pub(super) struct MalformedText {
     pub line: usize,
     pub problem: ErrorText,
 }
@@ -66,9 +66,9 @@ pub(super) struct Element<'a, 't> {
 
 impl<'t> Tree<'t> {
     /// Reads a text [`without_comments`].
-    pub(super) fn parse(text: &'t str) -> Result<Self, Malformed> {
+    pub(super) fn parse(text: &'t str) -> Result<Self, MalformedText> {
         let last = 1 + text.matches('\n').count();
-        let refused = |problem: ErrorText| Malformed {
+        let refused = |problem: ErrorText| MalformedText {
             line: last,
             problem,
         };
@@ -96,7 +96,7 @@ impl<'t> Tree<'t> {
     }
 
     /// Refuses more and deeper elements than a robot has.
-    fn bounded(&self) -> Result<(), Malformed> {
+    fn bounded(&self) -> Result<(), MalformedText> {
         let (mut open, mut elements) = (Vec::new(), 0);
         for node in self.document.descendants().filter(Node::is_element) {
             while open
@@ -117,7 +117,7 @@ impl<'t> Tree<'t> {
                 continue;
             };
             let line = self.line(node);
-            return Err(Malformed { line, problem });
+            return Err(MalformedText { line, problem });
         }
         Ok(())
     }
@@ -185,7 +185,7 @@ pub(super) fn tag_end(text: &str, start: usize) -> usize {
 }
 
 /// What the reader says of a text with `last` lines, with the line and the way out.
-fn malformed(text: &str, last: usize, error: &Error) -> Malformed {
+fn malformed(text: &str, last: usize, error: &Error) -> MalformedText {
     let at = error.pos();
     let (row, column) = (at.row as usize, at.col as usize);
     let here = text.lines().nth(row - 1).unwrap_or_default();
@@ -229,7 +229,7 @@ fn malformed(text: &str, last: usize, error: &Error) -> Malformed {
         }
     };
     let problem = ErrorText::new(what).remedy(remedy);
-    Malformed { line, problem }
+    MalformedText { line, problem }
 }
 
 /// The name at the beginning of a tag.

@@ -1,7 +1,7 @@
 //! The clock of a log: its step, how even it is, and where it stands still, runs back or leaps.
 
 use super::histogram::Histogram;
-use crate::inspect::fault::Episodes;
+use crate::inspect::fault::FaultEpisodes;
 
 /// A step longer than this many median ones is a gap (as `motion::FilterSettings::gap_factor`).
 pub(crate) const GAP: f64 = 2.5;
@@ -43,8 +43,8 @@ pub(crate) struct LogClock {
     long: Vec<[f64; 2]>,
     /// What is long for now.
     long_from: f64,
-    pub(crate) repeated: Episodes,
-    pub(crate) backward: Episodes,
+    pub(crate) repeated: FaultEpisodes,
+    pub(crate) backward: FaultEpisodes,
     pub(crate) without_time: u64,
 }
 

@@ -7,7 +7,7 @@ const CHANGES: u64 = 50;
 
 /// Counts for every pair of channels the rows in which one changed, and those of them in which they were equal.
 #[derive(Debug, Clone)]
-pub(crate) struct Copies {
+pub(crate) struct CopyDetector {
     channels: usize,
     pairs: Vec<PairCounts>,
     previous: Vec<f64>,
@@ -30,7 +30,7 @@ pub(crate) struct CopiedChannel {
     pub(crate) rows: u64,
 }
 
-impl Copies {
+impl CopyDetector {
     pub(crate) fn new(channels: usize) -> Self {
         Self {
             channels,
@@ -95,7 +95,7 @@ mod tests {
         let d: Vec<f64> = a.iter().map(|x| x * 1.001).collect();
         let rest = vec![0.0; 1000];
         let columns = [&a[..], &b, &c, &d, &rest, &rest];
-        let mut copies = Copies::new(6);
+        let mut copies = CopyDetector::new(6);
         for k in 0..1000 {
             copies.take(&columns, k);
         }

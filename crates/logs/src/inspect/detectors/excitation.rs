@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::histogram::Histogram;
-use crate::inspect::fault::Episodes;
+use crate::inspect::fault::FaultEpisodes;
 use cft_ident_core::math::rank;
 
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against the motion of a robot.
@@ -71,7 +71,7 @@ pub(crate) struct Excitation {
     /// Largest speed by the robot file, how many speeds in a row are beyond it, and when they were.
     limit: Option<f64>,
     fast: u32,
-    pub(crate) too_fast: Episodes,
+    pub(crate) too_fast: FaultEpisodes,
     /// First and last time [s] of the rows of the highest accelerations, and their sizes.
     highest: Vec<[f64; 3]>,
 }

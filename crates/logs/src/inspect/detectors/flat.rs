@@ -35,9 +35,10 @@ impl FlatRun {
     }
 }
 
+/// Finds the runs of rows in which a channel stands still, row after row.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Flat {
-    current: Option<Current>,
+pub(crate) struct FlatDetector {
+    current: Option<OpenFlatRun>,
     /// The runs of three rows and more, in the order of time.
     pub(crate) runs: Vec<FlatRun>,
     /// Rows of the shortest run that is kept, once there are too many.
@@ -47,12 +48,13 @@ pub(crate) struct Flat {
     /// Sizes of the steps from row to row, and of their changes, where the channel moves.
     pub(crate) steps: Histogram,
     pub(crate) bends: Histogram,
-    pub(crate) top: Levels,
-    pub(crate) bottom: Levels,
+    pub(crate) top: LargestLevels,
+    pub(crate) bottom: LargestLevels,
 }
 
+/// The run that has not ended yet, with the least and the greatest value in it.
 #[derive(Debug, Clone, Copy)]
-struct Current {
+struct OpenFlatRun {
     run: FlatRun,
     low: f64,
     high: f64,
@@ -60,7 +62,7 @@ struct Current {
     step: f64,
 }
 
-impl Flat {
+impl FlatDetector {
     /// Takes the next row: `position` is the joint's, where it is known and not this channel.
     #[inline]
     pub(crate) fn take(&mut self, t: f64, value: f64, position: f64) {
@@ -94,7 +96,7 @@ impl Flat {
     }
 
     fn begin(&mut self, t: f64, value: f64, position: f64, step: f64) {
-        self.current = Some(Current {
+        self.current = Some(OpenFlatRun {
             run: FlatRun {
                 value,
                 from: t,
@@ -133,12 +135,12 @@ impl Flat {
 
 /// The largest values of a channel, and how often each was there.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Levels {
+pub(crate) struct LargestLevels {
     /// Falling values.
     list: Vec<(f64, u64)>,
 }
 
-impl Levels {
+impl LargestLevels {
     #[inline]
     fn take(&mut self, value: f64) {
         let full = self.list.len() == LEVELS;
@@ -179,8 +181,8 @@ impl Levels {
 mod tests {
     use super::*;
 
-    fn fed(values: impl Iterator<Item = f64>) -> Flat {
-        let mut flat = Flat::default();
+    fn fed(values: impl Iterator<Item = f64>) -> FlatDetector {
+        let mut flat = FlatDetector::default();
         for (k, value) in values.enumerate() {
             let t = k as f64 * 0.001;
             flat.take(t, value, t);

@@ -3,8 +3,8 @@
 //! A recorder that is faster than the robot, or runs beside it on a clock of its own, now and then
 //! logs one sample twice and leaves out the next. Differentiated, that is a stop and a leap.
 
-use super::flat::Flat;
-use crate::inspect::fault::Episodes;
+use super::flat::FlatDetector;
+use crate::inspect::fault::FaultEpisodes;
 use crate::log::longest_hold;
 
 /// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
@@ -34,7 +34,7 @@ struct RepeatRun {
 
 /// Watches the positions of all joints together.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Repeats {
+pub(crate) struct RepeatDetector {
     previous: Vec<f64>,
     entry: Vec<f64>,
     /// Times of the run's first, second, last but one and last row; rows of it.
@@ -54,7 +54,7 @@ pub(crate) struct Repeats {
     same: u64,
 }
 
-impl Repeats {
+impl RepeatDetector {
     /// For so many positions, and torques and velocities.
     pub(crate) fn new(joints: usize, others: usize) -> Self {
         Self {
@@ -130,7 +130,7 @@ impl Repeats {
     }
 
     /// Stretches in which all channels froze while the robot moved; `channels` are the joints' own.
-    pub(crate) fn stalls(&self, channels: &[&Flat]) -> Episodes {
+    pub(crate) fn stalls(&self, channels: &[&FlatDetector]) -> FaultEpisodes {
         // Positions that stand still are a rest. They are frozen where torques and velocities, too, keep their last
         // digit, which they do not elsewhere, and the joints moved right before or after; or where a joint stops or
         // starts at once.
@@ -148,7 +148,7 @@ impl Repeats {
                 moves && (alive || largest > ABRUPT_BENDS * bend)
             })
         };
-        let mut episodes = Episodes::default();
+        let mut episodes = FaultEpisodes::default();
         for run in self.frozen.iter().filter(frozen) {
             let [first, .., last] = run.times;
             episodes.add(first, last, rows(run) + 1, 0.0);
@@ -174,7 +174,7 @@ impl Repeats {
     }
 
     /// What was found; `channels` are the joints' own, in the same order.
-    pub(crate) fn judge(&self, channels: &[&Flat]) -> RepeatedRows {
+    pub(crate) fn judge(&self, channels: &[&FlatDetector]) -> RepeatedRows {
         debug_assert_eq!(channels.len(), self.previous.len());
         let steps = channels.iter().map(|flat| &flat.steps);
         let least: Vec<f64> = steps.map(|steps| steps.quantile_not_zero(0.05)).collect();
@@ -231,7 +231,7 @@ pub(crate) struct RepeatedRows {
     /// All of them, and those at whose place the robot certainly moves.
     pub(crate) rows: u64,
     pub(crate) moving: u64,
-    pub(crate) episodes: Episodes,
+    pub(crate) episodes: FaultEpisodes,
     /// Rows to be left out: from, to [s].
     pub(crate) cuts: Vec<[f64; 2]>,
 }
@@ -243,7 +243,7 @@ mod tests {
     /// Positions alone, or with a torque that is different in every row but the repeated ones.
     fn judged(positions: &[f64], repeated: Option<&[usize]>) -> RepeatedRows {
         let width = usize::from(repeated.is_some());
-        let (mut repeats, mut flat) = (Repeats::new(1, width), Flat::default());
+        let (mut repeats, mut flat) = (RepeatDetector::new(1, width), FlatDetector::default());
         let mut torque = 0.0;
         for (k, q) in positions.iter().enumerate() {
             if repeated.is_none_or(|rows| !rows.contains(&k)) {

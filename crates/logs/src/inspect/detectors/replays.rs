@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use crate::inspect::fault::Episodes;
+use crate::inspect::fault::FaultEpisodes;
 
 /// Rows that are remembered; of longer logs every second of them, every fourth, and so on, chosen by what is in them.
 const MAX_REMEMBERED: usize = 1 << 16;
@@ -14,7 +14,7 @@ const MIN_HITS: u32 = 3;
 
 /// A stretch that has been seen before.
 #[derive(Debug, Clone, Copy)]
-struct Replay {
+struct RepeatedStretch {
     /// Rows from the first time to the second.
     distance: u64,
     /// Number and time of its first row and of its last.
@@ -25,7 +25,7 @@ struct Replay {
 
 /// Watches the rows of all joints together.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Replays {
+pub(crate) struct ReplayDetector {
     /// Number of the row that first had these numbers behind those of the row before.
     seen: HashMap<u64, u64>,
     /// A row is remembered where these bits of its sum are 0.
@@ -33,8 +33,8 @@ pub(crate) struct Replays {
     /// Sums of the positions and of all numbers of the row before.
     before: [u64; 2],
     rows: u64,
-    run: Option<Replay>,
-    found: Vec<Replay>,
+    run: Option<RepeatedStretch>,
+    found: Vec<RepeatedStretch>,
 }
 
 /// A sum of numbers by their bits (the multiplier is that of Knuth's Fibonacci hashing).
@@ -44,7 +44,7 @@ fn sum(numbers: &[f64], begin: u64) -> u64 {
     numbers.iter().fold(begin, mix)
 }
 
-impl Replays {
+impl ReplayDetector {
     /// Takes the positions of the next row, and its torques and velocities.
     #[inline]
     pub(crate) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
@@ -86,7 +86,7 @@ impl Replays {
             }
             _ => {
                 self.part();
-                self.run = Some(Replay {
+                self.run = Some(RepeatedStretch {
                     distance,
                     first: here,
                     last: here,
@@ -97,13 +97,14 @@ impl Replays {
     }
 
     pub(crate) fn part(&mut self) {
-        let long = |run: &Replay| run.hits >= MIN_HITS && run.last.0 - run.first.0 >= MIN_ROWS;
+        let long =
+            |run: &RepeatedStretch| run.hits >= MIN_HITS && run.last.0 - run.first.0 >= MIN_ROWS;
         self.found.extend(self.run.take().filter(long));
     }
 
     /// Stretches that stand in the log before them, those that have ended.
-    pub(crate) fn found(&self) -> Episodes {
-        let mut episodes = Episodes::default();
+    pub(crate) fn found(&self) -> FaultEpisodes {
+        let mut episodes = FaultEpisodes::default();
         for run in &self.found {
             let rows = run.last.0 - run.first.0 + 1;
             episodes.add(run.first.1, run.last.1, rows, 0.0);
@@ -118,7 +119,7 @@ mod tests {
 
     /// Stretches found in a log whose row k holds the numbers of row `of(k)` of a noisy motion.
     fn found(rows: u64, of: impl Fn(u64) -> u64) -> Vec<(f64, f64, u64)> {
-        let mut replays = Replays::default();
+        let mut replays = ReplayDetector::default();
         for k in 0..rows {
             let row = of(k);
             let x = row as f64;

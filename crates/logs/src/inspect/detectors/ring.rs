@@ -6,15 +6,15 @@ const ROWS: usize = 64;
 
 /// Numbers of the last 64 rows, by the numbers of the rows.
 #[derive(Debug, Clone)]
-pub(crate) struct Ring([f64; ROWS]);
+pub(crate) struct RowRing([f64; ROWS]);
 
-impl Default for Ring {
+impl Default for RowRing {
     fn default() -> Self {
         Self([0.0; ROWS])
     }
 }
 
-impl Index<usize> for Ring {
+impl Index<usize> for RowRing {
     type Output = f64;
 
     #[inline]
@@ -23,7 +23,7 @@ impl Index<usize> for Ring {
     }
 }
 
-impl IndexMut<usize> for Ring {
+impl IndexMut<usize> for RowRing {
     #[inline]
     fn index_mut(&mut self, row: usize) -> &mut f64 {
         &mut self.0[row % ROWS]

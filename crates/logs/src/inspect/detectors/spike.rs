@@ -10,7 +10,7 @@
 //! an inertia explains it.
 
 use super::histogram::Histogram;
-use super::ring::Ring;
+use super::ring::RowRing;
 
 const MEDIAN_ROWS: usize = 7;
 const HALF_WIDTH: usize = MEDIAN_ROWS / 2;
@@ -40,7 +40,7 @@ const MAX_TWO_ROW_SHARE: f64 = 0.5;
 
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Spike {
+pub(crate) struct SampleSpike {
     pub(crate) t: f64,
     /// Difference from the median of its neighbours.
     pub(crate) height: f64,
@@ -48,7 +48,7 @@ pub(crate) struct Spike {
     around: [[f64; 2]; 2 * REACH_ROWS + 1],
 }
 
-impl Spike {
+impl SampleSpike {
     /// The number of the cubic through the two nearest rows on each side that are not `bad`, where there are any.
     pub(crate) fn bridge(&self, bad: &dyn Fn(f64) -> bool) -> Option<f64> {
         let good = |row: &&[f64; 2]| !bad(row[0]);
@@ -74,13 +74,14 @@ fn cubic(nodes: &[[f64; 2]], at: f64) -> Option<f64> {
     Some((0..4).map(|i| weight(i) * nodes[i][1]).sum())
 }
 
+/// Finds rows that stand out between those before and behind them, row after row.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Spikes {
-    values: Ring,
-    times: Ring,
-    differences: Ring,
+pub(crate) struct SpikeDetector {
+    values: RowRing,
+    times: RowRing,
+    differences: RowRing,
     /// Positions of the joint.
-    positions: Ring,
+    positions: RowRing,
     /// How far its speed changes over three rows, but for what it does as steadily beside them [positions per two rows].
     changes_seen: Histogram,
     /// Rows since the stretch began.
@@ -91,14 +92,14 @@ pub(crate) struct Spikes {
     /// A difference above it may be a spike.
     suspect: f64,
     /// Those that may be spikes, in the order of time.
-    pub(crate) found: Vec<Spike>,
+    pub(crate) found: Vec<SampleSpike>,
     /// Height of the lowest spike that is kept, once there are too many.
     lowest: f64,
     /// Sums over the rows: of each step times the one before, of the squared steps, of the squared steps over two rows.
     steps: [f64; 3],
 }
 
-impl Spikes {
+impl SpikeDetector {
     /// Takes the next row of a channel, and the position of its joint where the channel is none itself.
     #[inline]
     pub(crate) fn take(&mut self, t: f64, value: f64, position: f64) {
@@ -251,7 +252,7 @@ impl Spikes {
             let at = row + i - REACH_ROWS;
             [self.times[at], self.values[at]]
         });
-        self.found.push(Spike {
+        self.found.push(SampleSpike {
             t: self.times[row],
             height,
             around,
@@ -304,8 +305,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn fed(values: &[f64]) -> Spikes {
-        let mut spikes = Spikes::default();
+    fn fed(values: &[f64]) -> SpikeDetector {
+        let mut spikes = SpikeDetector::default();
         for (k, value) in values.iter().enumerate() {
             if k % 256 == 0 {
                 spikes.settle();
@@ -346,7 +347,7 @@ mod tests {
             values[k] += 0.5;
         }
         let spikes = fed(&values);
-        let high: Vec<&Spike> = spikes.found.iter().filter(|s| s.height > 0.3).collect();
+        let high: Vec<&SampleSpike> = spikes.found.iter().filter(|s| s.height > 0.3).collect();
         let bad = |t: f64| high.iter().any(|spike| spike.t == t);
         assert_eq!(high.len(), 4);
         for spike in &high {
@@ -360,7 +361,7 @@ mod tests {
     fn a_peak_of_a_torque_is_none_where_the_speed_of_its_joint_changes_and_one_where_it_only_turns()
     {
         let found = |peak: usize| -> usize {
-            let mut spikes = Spikes::default();
+            let mut spikes = SpikeDetector::default();
             for k in 0..3000 {
                 if k % 256 == 0 {
                     spikes.settle();

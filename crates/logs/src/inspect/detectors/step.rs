@@ -7,7 +7,7 @@
 //! all through the log, and the motion, where the acceleration changes from one row to the next.
 
 use super::histogram::Histogram;
-use super::ring::Ring;
+use super::ring::RowRing;
 
 /// Rows to each side in which a leap must stand alone.
 const AROUND: usize = 25;
@@ -25,19 +25,21 @@ const MAX_LEAPS: usize = 4096;
 /// Largest heights that may be leaps, over those of 99 % of the rows.
 const SUSPECT_FACTOR: f64 = 3.0;
 
+/// A step of a channel from one row to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Leap {
+pub(crate) struct SampleLeap {
     /// Times of the last row before it and of the first one after it [s].
     pub(crate) before: f64,
     pub(crate) at: f64,
     pub(crate) height: f64,
 }
 
+/// Finds leaps of a channel, row after row.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Leaps {
-    times: Ring,
-    values: Ring,
-    heights: Ring,
+pub(crate) struct LeapDetector {
+    times: RowRing,
+    values: RowRing,
+    heights: RowRing,
     /// Rows since the stretch began.
     count: usize,
     /// Rows whose height was looked at.
@@ -45,11 +47,11 @@ pub(crate) struct Leaps {
     heights_seen: Histogram,
     suspect: f64,
     /// Those that may be leaps, in the order of time.
-    pub(crate) found: Vec<Leap>,
+    pub(crate) found: Vec<SampleLeap>,
     lowest: f64,
 }
 
-impl Leaps {
+impl LeapDetector {
     /// Takes the next row that is not one of a few that repeat the positions of the row before.
     #[inline]
     pub(crate) fn take(&mut self, t: f64, value: f64) {
@@ -139,7 +141,7 @@ impl Leaps {
             self.lowest = heights[MAX_LEAPS / 2];
             self.found.retain(|leap| leap.height.abs() > self.lowest);
         }
-        self.found.push(Leap {
+        self.found.push(SampleLeap {
             before: self.times[row - 1],
             at: self.times[row],
             height,
@@ -222,7 +224,7 @@ pub(crate) struct FreshRows {
 
 /// What to do with a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Freshness {
+pub(crate) enum RowFreshness {
     /// Its positions are those of the row before.
     Repeats,
     /// Its positions are new.
@@ -240,18 +242,18 @@ impl FreshRows {
     }
 
     #[inline]
-    pub(crate) fn look(&mut self, t: f64, positions: &[f64]) -> Freshness {
+    pub(crate) fn look(&mut self, t: f64, positions: &[f64]) -> RowFreshness {
         if positions == self.previous {
             self.repeated += 1;
             self.last = t;
-            return Freshness::Repeats;
+            return RowFreshness::Repeats;
         }
         let rest = self.repeated >= MIN_ROWS_AT_REST;
         self.repeated = 0;
         self.previous.copy_from_slice(positions);
         match rest {
-            true => Freshness::AfterRest(self.last),
-            false => Freshness::Fresh,
+            true => RowFreshness::AfterRest(self.last),
+            false => RowFreshness::Fresh,
         }
     }
 }
@@ -260,8 +262,8 @@ impl FreshRows {
 mod tests {
     use super::*;
 
-    fn fed(rows: impl Iterator<Item = (f64, f64)>) -> Leaps {
-        let mut leaps = Leaps::default();
+    fn fed(rows: impl Iterator<Item = (f64, f64)>) -> LeapDetector {
+        let mut leaps = LeapDetector::default();
         for (k, (t, q)) in rows.enumerate() {
             if k % 256 == 0 {
                 leaps.settle();
@@ -272,7 +274,7 @@ mod tests {
         leaps
     }
 
-    fn high(leaps: &Leaps, least: f64) -> Vec<(f64, f64)> {
+    fn high(leaps: &LeapDetector, least: f64) -> Vec<(f64, f64)> {
         let found = leaps.found.iter();
         let high = found.filter(|leap| leap.height.abs() > least);
         high.map(|leap| (leap.at, leap.height)).collect()
@@ -313,12 +315,12 @@ mod tests {
     fn a_rest_is_its_first_and_its_last_row_and_a_few_that_repeat_are_none() {
         let mut fresh = FreshRows::new(1);
         let rows = [0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 3.0];
-        let shown: Vec<Freshness> = (0..rows.len())
+        let shown: Vec<RowFreshness> = (0..rows.len())
             .map(|k| fresh.look(k as f64, &rows[k..=k]))
             .collect();
-        assert_eq!(shown[3], Freshness::Fresh);
-        assert_eq!(shown[10], Freshness::AfterRest(9.0));
-        let repeats = shown.iter().filter(|f| **f == Freshness::Repeats);
+        assert_eq!(shown[3], RowFreshness::Fresh);
+        assert_eq!(shown[10], RowFreshness::AfterRest(9.0));
+        let repeats = shown.iter().filter(|f| **f == RowFreshness::Repeats);
         assert_eq!(repeats.count(), 7);
     }
 }

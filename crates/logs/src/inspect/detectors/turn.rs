@@ -20,8 +20,9 @@ struct LongStep {
     range: f64,
 }
 
+/// Finds the long steps of a position that begins anew after its range, row after row.
 #[derive(Debug, Clone)]
-pub(crate) struct Turns {
+pub(crate) struct TurnDetector {
     low: f64,
     high: f64,
     /// Position of the row before, and the step to it; NaN where there is none.
@@ -32,7 +33,7 @@ pub(crate) struct Turns {
     full: bool,
 }
 
-impl Default for Turns {
+impl Default for TurnDetector {
     fn default() -> Self {
         Self {
             low: f64::INFINITY,
@@ -45,8 +46,9 @@ impl Default for Turns {
     }
 }
 
+/// A position that begins anew after its range, and how often it did.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Wrapped {
+pub(crate) struct WrappedPosition {
     pub(crate) range: f64,
     pub(crate) times: u64,
     /// Times of the first and the last [s].
@@ -54,7 +56,7 @@ pub(crate) struct Wrapped {
     pub(crate) to: f64,
 }
 
-impl Turns {
+impl TurnDetector {
     #[inline]
     pub(crate) fn take(&mut self, t: f64, value: f64) {
         self.low = self.low.min(value);
@@ -97,7 +99,7 @@ impl Turns {
     }
 
     /// The range, where the position goes through its end, by ranges that encoders have and a `usual` step from row to row.
-    pub(crate) fn wrapped(&self, usual: &[f64], step: f64) -> Option<Wrapped> {
+    pub(crate) fn wrapped(&self, usual: &[f64], step: f64) -> Option<WrappedPosition> {
         // All long steps must show the same range, and everything must lie within it. One or two alone are believed
         // of a usual range only: a reference that was set anew leaps once, too.
         let travel = self.high - self.low;
@@ -114,7 +116,7 @@ impl Turns {
         let fits = spread <= RANGE_AGREEMENT * median && travel <= (1.0 + RANGE_AGREEMENT) * range;
         let sure = known.is_some() || ranges.len() >= 3;
         // A joint at rest goes to and fro between two counts.
-        (fits && sure && range > MIN_STEPS_PER_RANGE * step).then_some(Wrapped {
+        (fits && sure && range > MIN_STEPS_PER_RANGE * step).then_some(WrappedPosition {
             range,
             times: ranges.len() as u64,
             from: first.t,
@@ -129,8 +131,8 @@ mod tests {
 
     const TURN: [f64; 2] = [std::f64::consts::TAU, 360.0];
 
-    fn watched(q: impl Fn(f64) -> f64) -> Turns {
-        let mut turns = Turns::default();
+    fn watched(q: impl Fn(f64) -> f64) -> TurnDetector {
+        let mut turns = TurnDetector::default();
         for k in 0..20_000 {
             let t = f64::from(k) * 1e-3;
             turns.take(t, q(t));

@@ -5,8 +5,9 @@ use super::windows::Window;
 /// Rows by which the velocity may lag or lead.
 const FARTHEST: usize = 50;
 
+/// How a logged velocity follows the derivative of its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Follows {
+pub(crate) struct VelocityMatch {
     /// Rows by which it is late; negative where it is early.
     pub(crate) rows: f64,
     /// Correlation with the derivative at that lag, and without a lag.
@@ -40,7 +41,11 @@ impl LagSums {
 }
 
 /// Finds the lag at which a velocity resembles the derivative of a position most; `None` where they move too little.
-pub(crate) fn follows(windows: &[Window], position: usize, velocity: usize) -> Option<Follows> {
+pub(crate) fn follows(
+    windows: &[Window],
+    position: usize,
+    velocity: usize,
+) -> Option<VelocityMatch> {
     let mut sums = [LagSums::default(); 2 * FARTHEST + 1];
     let mut derivative = Vec::new();
     for window in windows {
@@ -80,7 +85,7 @@ pub(crate) fn follows(windows: &[Window], position: usize, velocity: usize) -> O
             rows += (0.5 * (before - after) / bend).clamp(-0.5, 0.5);
         }
     }
-    Some(Follows {
+    Some(VelocityMatch {
         rows,
         best: correlations[peak],
         now,

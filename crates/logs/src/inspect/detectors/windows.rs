@@ -13,15 +13,16 @@ pub(crate) struct Window {
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
+/// Stretches of a channel that are kept for a closer look, evenly over the log.
 #[derive(Debug, Clone)]
-pub(crate) struct Windows {
+pub(crate) struct WindowSampler {
     pub(crate) kept: Vec<Window>,
     /// Every how many stretches one is kept.
     stride: u64,
     seen: u64,
 }
 
-impl Default for Windows {
+impl Default for WindowSampler {
     fn default() -> Self {
         Self {
             kept: Vec::new(),
@@ -31,7 +32,7 @@ impl Default for Windows {
     }
 }
 
-impl Windows {
+impl WindowSampler {
     pub(crate) fn offer(&mut self, t: &[f64], columns: &[&[f64]]) {
         let number = self.seen;
         self.seen += 1;
@@ -74,7 +75,7 @@ mod tests {
 
     #[test]
     fn stretches_of_a_long_log_are_kept_evenly_and_in_order() {
-        let mut windows = Windows::default();
+        let mut windows = WindowSampler::default();
         for k in 0..1000 {
             windows.offer(&[f64::from(k)], &[&[f64::from(-k)]]);
         }

@@ -47,7 +47,7 @@ pub(crate) struct DelayEstimate {
 
 /// Sums of one joint over one stretch.
 #[derive(Debug, Clone, Copy)]
-struct Sums {
+struct DelaySums {
     rows: f64,
     /// Y' Y.
     normal: [[f64; COLUMNS]; COLUMNS],
@@ -108,7 +108,7 @@ impl DelayEstimator {
         if !(dt > 0.0 && JACKKNIFE_STRETCHES.contains(&stretches.len())) {
             return None;
         }
-        let sums: Vec<Vec<Sums>> = (0..self.joints)
+        let sums: Vec<Vec<DelaySums>> = (0..self.joints)
             .filter_map(|joint| self.sums(joint, &stretches, dt, half))
             .collect();
         let delay = best_delay(&sums, None)? * dt;
@@ -155,7 +155,7 @@ impl DelayEstimator {
         stretches: &[Range<usize>],
         dt: f64,
         half: usize,
-    ) -> Option<Vec<Sums>> {
+    ) -> Option<Vec<DelaySums>> {
         let of = |values: &[f64], rows: &Range<usize>| -> Vec<f64> {
             let values = &values[rows.start * self.joints..rows.end * self.joints];
             let values = values.iter().skip(joint).step_by(self.joints);
@@ -195,13 +195,13 @@ impl DelayEstimator {
                 of(&|i| q[i].cos()),
                 vec![1.0; q.len()],
             ];
-            Sums::of(&columns, &twice(tau, half), TRIALS + 2 * half + 2)
+            DelaySums::of(&columns, &twice(tau, half), TRIALS + 2 * half + 2)
         });
         Some(sums.collect())
     }
 }
 
-impl Sums {
+impl DelaySums {
     const NONE: Self = Self {
         rows: 0.0,
         normal: [[0.0; COLUMNS]; COLUMNS],
@@ -287,11 +287,11 @@ impl Sums {
 }
 
 /// The delay in steps at which all joints together leave least, without one stretch if asked.
-fn best_delay(joints: &[Vec<Sums>], left_out: Option<usize>) -> Option<f64> {
+fn best_delay(joints: &[Vec<DelaySums>], left_out: Option<usize>) -> Option<f64> {
     let mut residuals = [0.0; 2 * TRIALS + 1];
     let mut any = false;
     for stretches in joints {
-        let mut sums = Sums::NONE;
+        let mut sums = DelaySums::NONE;
         for (index, stretch) in stretches.iter().enumerate() {
             if Some(index) != left_out {
                 sums.add(stretch);

@@ -6,7 +6,7 @@ use super::message::MessageHead;
 use super::path::FieldPath;
 use super::value::{Value, stamp_ns};
 use crate::log::layout::{Channel, Layout, column_number};
-use crate::log::time::{FAR_S, Instant, Stamped};
+use crate::log::time::{FAR_S, Instant, RowTime};
 use cft_ident_core::number::is_usable;
 
 /// The fields of one robot in messages, each with the paths that it may have.
@@ -116,29 +116,29 @@ impl RobotFields {
         values: &[Value],
         head: &MessageHead,
         source: TimeSource,
-    ) -> Option<Stamped> {
+    ) -> Option<RowTime> {
         match source {
-            TimeSource::Log => Some(Stamped::Exact(Instant::from_ns(head.log_ns))),
-            TimeSource::Publish => Some(Stamped::Exact(Instant::from_ns(head.publish_ns))),
+            TimeSource::Log => Some(RowTime::Exact(Instant::from_ns(head.log_ns))),
+            TimeSource::Publish => Some(RowTime::Exact(Instant::from_ns(head.publish_ns))),
             TimeSource::Header => {
                 let part = |index: usize| values[index].integer()?.try_into().ok();
                 let (s, ns): (i64, i64) = (part(self.header[0])?, part(self.header[1])?);
-                Some(Stamped::Exact(Instant::from_s_ns(s, ns)))
+                Some(RowTime::Exact(Instant::from_s_ns(s, ns)))
             }
             TimeSource::Field => match values[self.time] {
                 Value::Absent => None,
                 Value::Float(value) => {
                     let seconds = value * self.time_factor;
                     is_usable(seconds).then(|| match seconds.abs() < FAR_S {
-                        true => Stamped::Seconds(seconds),
-                        false => Stamped::Exact(Instant::default().plus(seconds)),
+                        true => RowTime::Seconds(seconds),
+                        false => RowTime::Exact(Instant::default().plus(seconds)),
                     })
                 }
                 whole => {
                     let value = whole.integer()?;
                     // Units of time are whole numbers of nanoseconds.
                     let ns = (self.time_factor * 1e9).round() as i128;
-                    Some(Stamped::Exact(Instant::from_ns(value.checked_mul(ns)?)))
+                    Some(RowTime::Exact(Instant::from_ns(value.checked_mul(ns)?)))
                 }
             },
         }
@@ -147,14 +147,14 @@ impl RobotFields {
 
 /// Fields of the last message that lacked some.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Parts {
+pub(super) struct PartialMessage {
     /// Its instant \[ns\]; none where nothing waits.
     instant: Option<i128>,
     values: Vec<Value>,
     waiting: u64,
 }
 
-impl Parts {
+impl PartialMessage {
     /// Fills in what messages of the same instant held; how many of those this one makes whole.
     pub(super) fn join(
         &mut self,

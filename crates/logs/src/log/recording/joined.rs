@@ -13,7 +13,7 @@ use super::state_topics::{ARRAYS, FoundTopic, survey};
 use super::value::{Value, stamp_ns};
 use crate::log::layout::{Channel, Layout};
 use crate::log::rows::{LogRows, counted};
-use crate::log::time::{Instant, Stamped};
+use crate::log::time::{Instant, RowTime};
 use crate::log::{Block, LogError, escape, list, source};
 use cft_ident_core::number::{beyond, is_usable};
 
@@ -57,7 +57,7 @@ pub(in crate::log) struct JoinedTopics {
 }
 
 /// Topics, each with its columns and their labels.
-type Fields = Vec<(String, Vec<(String, String)>)>;
+type TopicFields = Vec<(String, Vec<(String, String)>)>;
 
 /// `/topic:path` as topic and path.
 fn parted(column: &str) -> Option<(&str, &str)> {
@@ -84,7 +84,7 @@ impl JoinedTopics {
         if !named(&layout.velocities) {
             layout.velocities.clear();
         }
-        let mut fields = Fields::new();
+        let mut fields = TopicFields::new();
         let mut joints: Vec<usize> = Vec::new();
         let kinds = [&layout.positions, &layout.torques, &layout.velocities];
         for (joint, channel) in kinds.into_iter().flat_map(|of| of.iter().enumerate()) {
@@ -120,7 +120,7 @@ impl JoinedTopics {
     /// Every number of a topic: of the one that is named, of the first that holds a whole state, else of all.
     pub(in crate::log) fn of_all(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
         let mut recording = MessageFiles::open(paths, Vec::new())?;
-        let mut found = Fields::new();
+        let mut found = TopicFields::new();
         let (mut looked, mut unread) = (0, None);
         while looked < SEARCHED_MESSAGES
             && let Some(message) = recording.next()?
@@ -176,11 +176,11 @@ impl JoinedTopics {
             });
             (topic.clone(), named.collect())
         });
-        let fields: Fields = fields.collect();
+        let fields: TopicFields = fields.collect();
         Self::open(paths, fields, Layout::joint_columns(&[] as &[&str]))
     }
 
-    fn open(paths: &[PathBuf], fields: Fields, layout: Layout) -> Result<Self, LogError> {
+    fn open(paths: &[PathBuf], fields: TopicFields, layout: Layout) -> Result<Self, LogError> {
         let topics: Vec<String> = fields.iter().map(|(topic, _)| topic.clone()).collect();
         let mut schemas: Vec<Option<Arc<Schema>>> = vec![None; topics.len()];
         let mut recording = MessageFiles::open(paths, topics.clone())?;
@@ -343,11 +343,11 @@ impl LogRows for JoinedTopics {
         self.labels.get(column).map(String::as_str)
     }
 
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         loop {
             let t = self.waiting.front().map(|(t, ..)| *t);
             match (self.join(), t) {
-                (Some(true), Some(t)) => return Ok(Some(Stamped::Exact(t))),
+                (Some(true), Some(t)) => return Ok(Some(RowTime::Exact(t))),
                 (Some(_), _) => {}
                 (None, _) if self.ended => return Ok(None),
                 (None, _) => self.take_message()?,

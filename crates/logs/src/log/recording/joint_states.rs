@@ -6,18 +6,18 @@
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Uneven, refused};
+use super::message::{MessageHead, MessageReader, Schema, UnevenArray, refused};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
-use super::sources::{Publisher, Publishers};
+use super::sources::{MessagePublisher, PublisherSet};
 use super::state_topics::{
-    ARRAYS, COLUMNS, FoundTopic, Survey, TIMES, Times, groups, header_stamp, survey,
+    ARRAYS, COLUMNS, FoundTopic, TIMES, TimeReader, TopicSurvey, groups, header_stamp, survey,
 };
 use super::value::{Value, stamp_ns};
 use crate::log::LogError;
 use crate::log::names::{escape, list, suggestion};
 use crate::log::rows::{LogRows, counted};
-use crate::log::time::{Instant, Stamped};
+use crate::log::time::{Instant, RowTime};
 
 /// What is wrong with a recording without joint states.
 const NO_STATES: &str = "no topic holds sensor_msgs/msg/JointState";
@@ -36,10 +36,10 @@ struct StateTopic {
     stamped: bool,
     zero_is_time: bool,
     fields: Vec<Vec<FieldPath>>,
-    publishers: Publishers,
+    publishers: PublisherSet,
     /// Messages with an array that cannot be given to joints, and the first of them.
     uneven: u64,
-    first_uneven: Option<Uneven>,
+    first_uneven: Option<UnevenArray>,
 }
 
 #[derive(Default)]
@@ -55,7 +55,7 @@ struct StateRow {
 pub(in crate::log) struct JointStates {
     recording: MessageFiles,
     sources: Vec<StateTopic>,
-    times: Times,
+    times: TimeReader,
     columns: Vec<String>,
     row: StateRow,
     /// The row that begins with the message after this row.
@@ -76,7 +76,7 @@ pub(in crate::log) struct JointStates {
 impl JointStates {
     /// Finds the topics, those of `topic` and of what was recorded at its instants where one is named.
     pub(in crate::log) fn open(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
-        let Survey {
+        let TopicSurvey {
             mut found,
             others: mut other_topics,
             times,
@@ -162,7 +162,7 @@ impl JointStates {
                 stamped: one.stamped,
                 zero_is_time: one.stamps.are_times(),
                 fields,
-                publishers: Publishers::default(),
+                publishers: PublisherSet::default(),
                 uneven: 0,
                 first_uneven: None,
             });
@@ -220,7 +220,7 @@ impl JointStates {
                 self.unreadable += 1;
                 continue;
             }
-            let publisher = Publisher::of(&head, &*one.reader);
+            let publisher = MessagePublisher::of(&head, &*one.reader);
             let place = (&*self.paths, &*one.topic);
             let numbers = &one.values[2..];
             let fields = &one.fields[2..];
@@ -268,7 +268,7 @@ impl LogRows for JointStates {
         &self.columns
     }
 
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         std::mem::swap(&mut self.row, &mut self.ahead);
         if !self.row.full {
             // It is at the end for good.
@@ -278,8 +278,8 @@ impl LogRows for JointStates {
         self.begin()?;
         self.incomplete += u64::from(self.row.sources.contains(&false));
         Ok(Some(match self.row.exact {
-            Some(seconds) => Stamped::Seconds(seconds),
-            None => Stamped::Exact(Instant::from_ns(self.row.key)),
+            Some(seconds) => RowTime::Seconds(seconds),
+            None => RowTime::Exact(Instant::from_ns(self.row.key)),
         }))
     }
 

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::encoding::reader_of;
-use super::message::Leaf;
+use super::message::FieldLeaf;
 use super::parts::MessageFiles;
 use crate::log::{LogError, escape};
 
@@ -54,7 +54,10 @@ pub(in crate::log) fn listing(paths: &[PathBuf]) -> Result<Vec<TopicFacts>, LogE
                 match reader_of(&topic.schema, &[]) {
                     Ok(reader) => {
                         let leaves = reader.leaves(message.data);
-                        facts.fields = leaves.into_iter().map(|leaf: Leaf| leaf.path).collect();
+                        facts.fields = leaves
+                            .into_iter()
+                            .map(|leaf: FieldLeaf| leaf.path)
+                            .collect();
                     }
                     Err(reason) => facts.unreadable = Some(escape(&reason)),
                 }

@@ -42,8 +42,9 @@ pub(super) struct MessageHead {
     pub(super) number: u64,
 }
 
+/// Where a recording breaks off, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Break {
+pub(super) struct RecordingBreak {
     pub(super) reason: String,
     /// How much of it was read, as it stands after "breaks off".
     pub(super) place: String,
@@ -57,7 +58,7 @@ pub(super) trait MessageFile: Send {
     /// The next message of a wanted topic, its bytes in `data`; `None` at the end.
     fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<MessageHead>, LogError>;
 
-    fn broken(&self) -> Option<&Break>;
+    fn broken(&self) -> Option<&RecordingBreak>;
 }
 
 /// Reads the fields that it was made for out of the messages of one topic: what each encoding does.
@@ -73,23 +74,23 @@ pub(super) trait MessageReader: Send {
     }
 
     /// An array of the message that was read last whose elements cannot be given to the names beside it.
-    fn uneven(&self) -> Option<Uneven> {
+    fn uneven(&self) -> Option<UnevenArray> {
         None
     }
 
     /// Every number that a message holds, with the path that leads to it.
-    fn leaves(&self, data: &[u8]) -> Vec<Leaf>;
+    fn leaves(&self, data: &[u8]) -> Vec<FieldLeaf>;
 }
 
 /// An array that does not fit its list of names.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Uneven {
+pub(super) struct UnevenArray {
     pub(super) array: String,
     pub(super) numbers: usize,
     pub(super) names: usize,
 }
 
-impl fmt::Display for Uneven {
+impl fmt::Display for UnevenArray {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             array,
@@ -104,8 +105,9 @@ impl fmt::Display for Uneven {
     }
 }
 
+/// A number of a message by its path.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Leaf {
+pub(super) struct FieldLeaf {
     pub(super) path: String,
     /// The same with the names that lists of the message give to elements.
     pub(super) label: String,

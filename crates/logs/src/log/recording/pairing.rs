@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use super::delay::DelayEstimator;
 use crate::log::layout::Layout;
 use crate::log::rows::counted;
-use crate::log::time::{Instant, Stamped};
+use crate::log::time::{Instant, RowTime};
 
 /// Rows that wait for their torque at most.
 const MAX_WAITING_ROWS: usize = 1 << 14;
@@ -24,7 +24,7 @@ const DROPOUT_STEPS: f64 = 2.5;
 /// What one message, or one row, holds: as logged, not scaled.
 #[derive(Default)]
 pub(super) struct Sample {
-    pub(super) stamp: Stamped,
+    pub(super) stamp: RowTime,
     pub(super) q: Vec<f64>,
     pub(super) tau: Vec<f64>,
     pub(super) dq: Vec<f64>,
@@ -34,8 +34,9 @@ pub(super) struct Sample {
     pub(super) file: String,
 }
 
+/// Pairs positions and torques that come in messages of their own.
 #[derive(Default)]
-pub(super) struct Pairing {
+pub(super) struct TorquePairing {
     zero_order_hold: bool,
     delay_s: f64,
     waiting: VecDeque<Sample>,
@@ -54,7 +55,7 @@ pub(super) struct Pairing {
     delay: DelayEstimator,
 }
 
-impl Pairing {
+impl TorquePairing {
     pub(super) fn new(layout: &Layout) -> Self {
         Self {
             zero_order_hold: layout.zero_order_hold,

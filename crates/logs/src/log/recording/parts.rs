@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use super::format::format_of;
-use super::message::{Break, MessageFile, MessageHead, Topic};
-use crate::log::content::{Content, Unpacker};
+use super::message::{MessageFile, MessageHead, RecordingBreak, Topic};
+use crate::log::content::{FileContent, MessageUnpacker};
 use crate::log::{LogError, escape, list, source};
 
 /// Files of one recording that are open at a time.
@@ -27,13 +27,13 @@ struct OpenFile {
     failed: Option<LogError>,
     head: Option<MessageHead>,
     data: Vec<u8>,
-    unpacker: Unpacker,
+    unpacker: MessageUnpacker,
 }
 
 impl OpenFile {
     /// Opens a file; `None` for one of no bytes, which a recorder that lost its power leaves behind.
     fn open(path: &Path, wanted: &[String]) -> Result<Option<Self>, LogError> {
-        let content = Content::open(path)?;
+        let content = FileContent::open(path)?;
         if content.head().is_empty() {
             return Ok(None);
         }
@@ -54,7 +54,7 @@ impl OpenFile {
             failed: None,
             head: None,
             data: Vec::new(),
-            unpacker: Unpacker::default(),
+            unpacker: MessageUnpacker::default(),
         };
         part.advance()?;
         Ok(Some(part))
@@ -104,7 +104,7 @@ pub(super) struct MessageFiles {
     /// The part whose message was handed out last.
     current: Option<usize>,
     /// What was said of files that broke off.
-    pub(super) broken: Vec<(PathBuf, Break)>,
+    pub(super) broken: Vec<(PathBuf, RecordingBreak)>,
     /// Every topic seen so far, wanted or not.
     pub(super) seen: Vec<Topic>,
     /// Parts that the recording is said to have and that are not there.
@@ -142,7 +142,7 @@ impl MessageFiles {
             match OpenFile::open(&path, &self.wanted)? {
                 Some(part) => self.parts.push(part),
                 None => {
-                    let nothing = Break {
+                    let nothing = RecordingBreak {
                         reason: "it is empty: the recorder ended before it wrote anything"
                             .to_owned(),
                         place: "at its first byte".to_owned(),

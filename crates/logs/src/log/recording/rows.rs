@@ -2,24 +2,24 @@
 
 use std::path::PathBuf;
 
-use super::encoding::Readers;
-use super::fields::{Parts, RobotFields, TimeSource};
+use super::encoding::SchemaReaders;
+use super::fields::{PartialMessage, RobotFields, TimeSource};
 use super::message::refused;
-use super::pairing::{Pairing, Sample};
+use super::pairing::{Sample, TorquePairing};
 use super::parts::{Message, MessageFiles};
-use super::sources::{Publisher, Publishers};
-use super::survey::{self, Choice};
+use super::sources::{MessagePublisher, PublisherSet};
+use super::survey::{self, TopicChoice};
 use super::value::Value;
 use crate::log::layout::{Channel, Layout};
 use crate::log::rows::{LogRows, counted};
-use crate::log::time::Stamped;
+use crate::log::time::RowTime;
 use crate::log::{Block, LogError, escape, source};
 use cft_ident_core::number::{beyond, is_usable};
 
 pub(in crate::log) struct MessageRows {
     recording: MessageFiles,
     reading: SampleReader,
-    pairing: Option<Pairing>,
+    pairing: Option<TorquePairing>,
     row: Sample,
     previous: Sample,
     messages: u64,
@@ -30,8 +30,8 @@ pub(in crate::log) struct MessageRows {
 struct SampleReader {
     layout: Layout,
     fields: RobotFields,
-    choice: Choice,
-    readers: Readers,
+    choice: TopicChoice,
+    readers: SchemaReaders,
     values: Vec<Value>,
     /// Messages that lack a joint or a time, and those that cannot be decoded, with the first reason.
     incomplete: LeftOut,
@@ -43,8 +43,8 @@ struct SampleReader {
     begins_unstamped: bool,
     /// Files of the recording, and who publishes on the topics of positions and of torques.
     paths: Vec<PathBuf>,
-    publishers: [Publishers; 2],
-    parts: [Parts; 2],
+    publishers: [PublisherSet; 2],
+    parts: [PartialMessage; 2],
 }
 
 #[derive(Default)]
@@ -62,8 +62,9 @@ impl LeftOut {
     }
 }
 
+/// What a message gives to a row.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Holds {
+enum SampleContent {
     Whole,
     Positions,
     Torques,
@@ -79,7 +80,10 @@ impl MessageRows {
         let mut names = vec![choice.topic.clone()];
         names.extend(choice.torque_topic.clone());
         let fields = RobotFields::new(&layout);
-        let pairing = choice.torque_topic.is_some().then(|| Pairing::new(&layout));
+        let pairing = choice
+            .torque_topic
+            .is_some()
+            .then(|| TorquePairing::new(&layout));
         let velocities = match choice.velocities {
             true => &layout.velocities[..],
             false => &[],
@@ -100,7 +104,7 @@ impl MessageRows {
                 layout: layout.clone(),
                 fields,
                 choice,
-                readers: Readers::default(),
+                readers: SchemaReaders::default(),
                 incomplete: LeftOut::default(),
                 unreadable: LeftOut::default(),
                 unstamped: 0,
@@ -141,7 +145,7 @@ impl LogRows for MessageRows {
         &self.names
     }
 
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         std::mem::swap(&mut self.row, &mut self.previous);
         loop {
             if let Some(pairing) = &mut self.pairing
@@ -166,9 +170,9 @@ impl LogRows for MessageRows {
                 continue;
             };
             match (&mut self.pairing, part) {
-                (None, _) | (_, Holds::Whole) => return Ok(Some(self.row.stamp)),
-                (Some(pairing), Holds::Positions) => pairing.add_positions(&mut self.row),
-                (Some(pairing), Holds::Torques) => pairing.add_torques(&mut self.row),
+                (None, _) | (_, SampleContent::Whole) => return Ok(Some(self.row.stamp)),
+                (Some(pairing), SampleContent::Positions) => pairing.add_positions(&mut self.row),
+                (Some(pairing), SampleContent::Torques) => pairing.add_torques(&mut self.row),
             }
         }
     }
@@ -288,7 +292,7 @@ impl SampleReader {
         &mut self,
         message: &Message<'_>,
         sample: &mut Sample,
-    ) -> Result<Option<Holds>, LogError> {
+    ) -> Result<Option<SampleContent>, LogError> {
         let Message {
             path,
             topic,
@@ -316,23 +320,23 @@ impl SampleReader {
             return Ok(None);
         }
         let part = match &self.choice.torque_topic {
-            None => Holds::Whole,
-            Some(torques) if torques == topic => Holds::Torques,
-            Some(_) => Holds::Positions,
+            None => SampleContent::Whole,
+            Some(torques) if torques == topic => SampleContent::Torques,
+            Some(_) => SampleContent::Positions,
         };
-        let of = usize::from(part == Holds::Torques);
+        let of = usize::from(part == SampleContent::Torques);
         let fields = &self.fields;
         let (q, tau) = (fields.positions.clone(), fields.torques.clone());
         let (needed, q, tau) = match part {
-            Holds::Whole => (q.start..tau.end, q, tau),
-            Holds::Positions => (q.clone(), q, 0..0),
-            Holds::Torques => (tau.clone(), 0..0, tau),
+            SampleContent::Whole => (q.start..tau.end, q, tau),
+            SampleContent::Positions => (q.clone(), q, 0..0),
+            SampleContent::Torques => (tau.clone(), 0..0, tau),
         };
-        let dq = match self.choice.velocities && part != Holds::Torques {
+        let dq = match self.choice.velocities && part != SampleContent::Torques {
             true => fields.velocities.clone(),
             false => 0..0,
         };
-        let publisher = Publisher::of(head, &**reader);
+        let publisher = MessagePublisher::of(head, &**reader);
         let (paths, numbers) = (&fields.paths[needed.clone()], &self.values[needed.clone()]);
         let at = (&*self.paths, &**topic);
         if !self.publishers[of].take(publisher, at, paths, numbers)? {

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::encoding::Readers;
+use super::encoding::SchemaReaders;
 use super::message::{MessageHead, MessageReader};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
@@ -17,12 +17,12 @@ use crate::log::LogError;
 
 /// Who published a message: its channel, and the order of its names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Publisher {
+pub(super) struct MessagePublisher {
     channel: u16,
     order: u64,
 }
 
-impl Publisher {
+impl MessagePublisher {
     pub(super) fn of(head: &MessageHead, reader: &dyn MessageReader) -> Self {
         Self {
             channel: head.channel,
@@ -31,22 +31,23 @@ impl Publisher {
     }
 }
 
+/// The publishers of a topic, and which of them a log is read from.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Publishers {
+pub(super) struct PublisherSet {
     /// Each with whether its messages are used.
-    known: Vec<(Publisher, bool)>,
+    known: Vec<(MessagePublisher, bool)>,
     left_out: u64,
     /// None of the numbers that were left out was other than 0.
     zeros: bool,
     /// The one whose message came last: mostly the next one's too.
-    last: Option<Publisher>,
+    last: Option<MessagePublisher>,
 }
 
-impl Publishers {
+impl PublisherSet {
     /// Whether a message is used. Once a second publisher appears, the whole topic is gone through.
     pub(super) fn take(
         &mut self,
-        publisher: Publisher,
+        publisher: MessagePublisher,
         (paths, topic): (&[PathBuf], &str),
         fields: &[Vec<FieldPath>],
         values: &[Value],
@@ -88,8 +89,9 @@ impl Publishers {
     }
 }
 
+/// What the messages of one topic showed: how many, their first and last numbers, and their steps.
 #[derive(Default)]
-struct Seen {
+struct TopicActivity {
     messages: u64,
     first: Vec<f64>,
     last: Vec<f64>,
@@ -102,7 +104,7 @@ struct Seen {
     off: u64,
 }
 
-impl Seen {
+impl TopicActivity {
     fn take(&mut self, numbers: &[f64]) {
         self.messages += 1;
         if self.first.is_empty() {
@@ -137,8 +139,8 @@ fn judged(
     paths: &[PathBuf],
     topic: &str,
     fields: &[Vec<FieldPath>],
-) -> Result<Vec<(Publisher, bool)>, LogError> {
-    let mut all: BTreeMap<Publisher, Seen> = BTreeMap::new();
+) -> Result<Vec<(MessagePublisher, bool)>, LogError> {
+    let mut all: BTreeMap<MessagePublisher, TopicActivity> = BTreeMap::new();
     through(paths, topic, fields, &mut |publisher, numbers| {
         all.entry(publisher).or_default().take(numbers);
     })?;
@@ -147,9 +149,9 @@ fn judged(
         .max_by_key(|(_, seen)| (seen.moved, seen.messages))
         .map(|(publisher, _)| *publisher);
     let steps = main.and_then(|main| all.get(&main));
-    let steps = steps.map_or_else(Vec::new, Seen::fine_steps);
+    let steps = steps.map_or_else(Vec::new, TopicActivity::fine_steps);
     let mut before: Option<Vec<f64>> = None;
-    let mut between: Vec<(Publisher, Vec<f64>)> = Vec::new();
+    let mut between: Vec<(MessagePublisher, Vec<f64>)> = Vec::new();
     through(paths, topic, fields, &mut |publisher, numbers| {
         if Some(publisher) != main {
             if before.is_some() && between.len() < MOST_BETWEEN {
@@ -172,7 +174,7 @@ fn judged(
         }
         before = Some(numbers.to_vec());
     })?;
-    let used = |seen: &Seen| 2 * seen.off <= seen.compared;
+    let used = |seen: &TopicActivity| 2 * seen.off <= seen.compared;
     Ok(all.iter().map(|(one, seen)| (*one, used(seen))).collect())
 }
 
@@ -186,10 +188,10 @@ fn through(
     paths: &[PathBuf],
     topic: &str,
     fields: &[Vec<FieldPath>],
-    take: &mut dyn FnMut(Publisher, &[f64]),
+    take: &mut dyn FnMut(MessagePublisher, &[f64]),
 ) -> Result<(), LogError> {
     let mut recording = MessageFiles::open(paths, vec![topic.to_owned()])?;
-    let mut readers = Readers::default();
+    let mut readers = SchemaReaders::default();
     let mut values = vec![Value::Absent; fields.len()];
     let mut numbers = Vec::new();
     while let Some(message) = recording.next()? {
@@ -198,7 +200,7 @@ fn through(
         {
             numbers.clear();
             numbers.extend(values.iter().map(|v| v.number().unwrap_or(f64::NAN)));
-            take(Publisher::of(&message.head, &**reader), &numbers);
+            take(MessagePublisher::of(&message.head, &**reader), &numbers);
         }
     }
     Ok(())

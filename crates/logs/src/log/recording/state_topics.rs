@@ -50,18 +50,18 @@ pub(super) struct FoundTopic {
 }
 
 /// The reader of times that are no whole nanoseconds, with its schema.
-pub(super) type Times = Option<(Schema, Box<dyn MessageReader>)>;
+pub(super) type TimeReader = Option<(Schema, Box<dyn MessageReader>)>;
 
 /// What a recording holds beside the topics of joint states: other topics, and a topic of times.
-pub(super) struct Survey {
+pub(super) struct TopicSurvey {
     pub found: Vec<FoundTopic>,
     pub others: Vec<String>,
-    pub times: Times,
+    pub times: TimeReader,
     /// Why a recording whose topics are of that kind holds no joint state, and what to do, where none was found.
     pub cause: Option<(String, &'static str)>,
 }
 
-pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
+pub(super) fn survey(paths: &[PathBuf]) -> Result<TopicSurvey, LogError> {
     let mut recording = MessageFiles::open(paths, Vec::new())?;
     let mut found: Vec<FoundTopic> = Vec::new();
     let mut times = None;
@@ -118,7 +118,7 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
         found.iter().any(|one| one.topic == *name) || (times.is_some() && name == TIMES)
     };
     let others = others.filter(|name| !used(name)).collect();
-    Ok(Survey {
+    Ok(TopicSurvey {
         found,
         others,
         times,

@@ -4,23 +4,24 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::fields::{Parts, RobotFields, TimeSource};
-use super::message::{MessageHead, OpenedReader, Uneven, refused};
+use super::fields::{PartialMessage, RobotFields, TimeSource};
+use super::message::{MessageHead, OpenedReader, UnevenArray, refused};
 use super::parts::MessageFiles;
 use super::sources::ZeroStamps;
 use super::value::Value;
 use crate::log::LogError;
 use crate::log::layout::Layout;
 use crate::log::names::{escape, list, nearest, suggestion};
-use crate::log::section::Stamp;
+use crate::log::section::StampSource;
 
 /// Messages of a topic that are looked at before it is given up.
 const TRIES: u32 = 200;
 /// Messages that are looked at for further topics once the channels are found.
 const FURTHER: u32 = 2000;
 
+/// The topics that a log is read from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Choice {
+pub(super) struct TopicChoice {
     /// Topic of the positions; of the torques where there are no positions to read.
     pub(super) topic: String,
     /// Topic of the torques, where it is another one.
@@ -37,14 +38,14 @@ struct TopicCandidate {
     kind: String,
     reader: OpenedReader,
     tries: u32,
-    shown: Shown,
+    shown: TopicContents,
     /// Which velocities were a number at least once.
     measured: Vec<bool>,
     stamps: ZeroStamps,
     /// Fields of messages of one instant, each of which holds some of the joints.
-    parts: Parts,
+    parts: PartialMessage,
     /// An array that no name can be given to the elements of.
-    uneven: Option<Uneven>,
+    uneven: Option<UnevenArray>,
     /// Fields that no message had so far.
     missing: Vec<bool>,
     names: Vec<String>,
@@ -52,7 +53,7 @@ struct TopicCandidate {
 
 /// What messages of a topic were seen to hold.
 #[derive(Clone, Copy, Default, PartialEq)]
-struct Shown {
+struct TopicContents {
     /// Channels as numbers.
     measured: Channels,
     /// Channels by their names; a driver without that sensor publishes NaN.
@@ -137,7 +138,10 @@ impl TopicCandidate {
 }
 
 /// Reads the beginning of a recording, and chooses.
-pub(super) fn choose(paths: &[PathBuf], layout: &Layout) -> Result<(Choice, Layout), LogError> {
+pub(super) fn choose(
+    paths: &[PathBuf],
+    layout: &Layout,
+) -> Result<(TopicChoice, Layout), LogError> {
     let mut surveys = Vec::new();
     for layout in [Some(layout), layout.otherwise.as_deref()]
         .into_iter()
@@ -180,10 +184,10 @@ fn survey(
                     kind: message.topic.schema.name.clone(),
                     reader: reader_of(&message.topic.schema, &fields.paths),
                     tries: 0,
-                    shown: Shown::default(),
+                    shown: TopicContents::default(),
                     measured: Vec::new(),
                     stamps: ZeroStamps::default(),
-                    parts: Parts::default(),
+                    parts: PartialMessage::default(),
                     uneven: None,
                     missing: vec![true; fields.paths.len()],
                     names: Vec::new(),
@@ -235,7 +239,7 @@ struct ChannelTopics<'c> {
 }
 
 /// What counts as held.
-type CountedChannels = fn(&Shown) -> Channels;
+type CountedChannels = fn(&TopicContents) -> Channels;
 const MEASURED: CountedChannels = |shown| shown.measured;
 const NAMED: CountedChannels = |shown| shown.named;
 
@@ -299,7 +303,7 @@ fn pick(
     layout: &Layout,
     fields: &RobotFields,
     counted: &[CountedChannels],
-) -> Result<Choice, (String, String)> {
+) -> Result<TopicChoice, (String, String)> {
     let mut positions = None;
     for counted in counted {
         let found = holding(found, layout, fields, *counted)?;
@@ -319,10 +323,10 @@ fn pick(
 fn choice(
     first: &TopicCandidate,
     second: Option<&TopicCandidate>,
-    stamp: Stamp,
-) -> Result<Choice, (String, String)> {
+    stamp: StampSource,
+) -> Result<TopicChoice, (String, String)> {
     let (time, notes) = time_source(first, second, stamp)?;
-    Ok(Choice {
+    Ok(TopicChoice {
         topic: first.name.clone(),
         torque_topic: second.map(|c| c.name.clone()),
         time,
@@ -336,7 +340,7 @@ fn choice(
 fn time_source(
     first: &TopicCandidate,
     second: Option<&TopicCandidate>,
-    asked: Stamp,
+    asked: StampSource,
 ) -> Result<(TimeSource, Vec<String>), (String, String)> {
     let shown = [
         first.shown,
@@ -344,22 +348,22 @@ fn time_source(
     ];
     let headers = shown.map(|shown| shown.header);
     let source = match asked {
-        Stamp::Header if headers.contains(&false) => {
+        StampSource::Header if headers.contains(&false) => {
             let topic = escape(&first.name);
             return Err((
                 format!("messages of {topic} have no stamp in a header"),
                 "set `stamp = \"log\"` in [log] of the robot file".to_owned(),
             ));
         }
-        Stamp::Header => TimeSource::Header,
-        Stamp::Publish => TimeSource::Publish,
-        Stamp::Auto if shown.iter().all(|shown| shown.time) => TimeSource::Field,
-        Stamp::Auto if !headers.contains(&false) => TimeSource::Header,
-        Stamp::Auto if headers.contains(&true) => {
+        StampSource::Header => TimeSource::Header,
+        StampSource::Publish => TimeSource::Publish,
+        StampSource::Auto if shown.iter().all(|shown| shown.time) => TimeSource::Field,
+        StampSource::Auto if !headers.contains(&false) => TimeSource::Header,
+        StampSource::Auto if headers.contains(&true) => {
             let note = "only one of the two topics has stamps in headers: the times of recording are used for both, delays of transport included";
             return Ok((TimeSource::Log, vec![note.to_owned()]));
         }
-        Stamp::Auto | Stamp::Log => TimeSource::Log,
+        StampSource::Auto | StampSource::Log => TimeSource::Log,
     };
     Ok((source, Vec::new()))
 }

@@ -3,20 +3,21 @@
 use std::iter::Peekable;
 use std::str::Chars;
 
+/// A literal of Python, as the head of a NumPy array has it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Literal {
+pub(super) enum PythonLiteral {
     Text(String),
     Whole(u64),
     Truth(bool),
     /// A tuple or a list.
-    List(Vec<Literal>),
-    Dictionary(Vec<(Literal, Literal)>),
+    List(Vec<PythonLiteral>),
+    Dictionary(Vec<(PythonLiteral, PythonLiteral)>),
 }
 
 /// Values within values.
 const DEPTH: usize = 16;
 
-impl Literal {
+impl PythonLiteral {
     /// The value that a text writes; `None` where it writes another kind.
     pub(super) fn parse(text: &str) -> Option<Self> {
         value(&mut text.chars().peekable(), DEPTH)
@@ -26,7 +27,7 @@ impl Literal {
         let Self::Dictionary(entries) = self else {
             return None;
         };
-        let is = |(own, _): &&(Literal, Literal)| matches!(own, Self::Text(own) if own == key);
+        let is = |(own, _): &&(PythonLiteral, PythonLiteral)| matches!(own, Self::Text(own) if own == key);
         entries.iter().find(is).map(|(_, value)| value)
     }
 
@@ -50,7 +51,7 @@ fn skip(text: &mut Peekable<Chars<'_>>) {
     {}
 }
 
-fn value(text: &mut Peekable<Chars<'_>>, depth: usize) -> Option<Literal> {
+fn value(text: &mut Peekable<Chars<'_>>, depth: usize) -> Option<PythonLiteral> {
     let depth = depth.checked_sub(1)?;
     skip(text);
     match text.next()? {
@@ -58,18 +59,18 @@ fn value(text: &mut Peekable<Chars<'_>>, depth: usize) -> Option<Literal> {
             let mut out = String::new();
             loop {
                 match text.next()? {
-                    c if c == quote => return Some(Literal::Text(out)),
+                    c if c == quote => return Some(PythonLiteral::Text(out)),
                     '\\' => out.push(text.next()?),
                     c => out.push(c),
                 }
             }
         }
-        '(' => list(text, ')', depth).map(Literal::List),
-        '[' => list(text, ']', depth).map(Literal::List),
+        '(' => list(text, ')', depth).map(PythonLiteral::List),
+        '[' => list(text, ']', depth).map(PythonLiteral::List),
         '{' => {
             let all = list(text, '}', depth)?;
             let pairs = all.chunks_exact(2).map(|p| (p[0].clone(), p[1].clone()));
-            Some(Literal::Dictionary(pairs.collect()))
+            Some(PythonLiteral::Dictionary(pairs.collect()))
         }
         first if first.is_ascii_digit() => {
             let mut digits = String::from(first);
@@ -78,7 +79,7 @@ fn value(text: &mut Peekable<Chars<'_>>, depth: usize) -> Option<Literal> {
             }
             // Python 2 wrote an L behind a long one
             let _ = text.next_if_eq(&'L');
-            digits.parse().ok().map(Literal::Whole)
+            digits.parse().ok().map(PythonLiteral::Whole)
         }
         first => {
             let mut word = String::from(first);
@@ -86,15 +87,15 @@ fn value(text: &mut Peekable<Chars<'_>>, depth: usize) -> Option<Literal> {
                 word.push(letter);
             }
             match &*word {
-                "True" => Some(Literal::Truth(true)),
-                "False" => Some(Literal::Truth(false)),
+                "True" => Some(PythonLiteral::Truth(true)),
+                "False" => Some(PythonLiteral::Truth(false)),
                 _ => None,
             }
         }
     }
 }
 
-fn list(text: &mut Peekable<Chars<'_>>, end: char, depth: usize) -> Option<Vec<Literal>> {
+fn list(text: &mut Peekable<Chars<'_>>, end: char, depth: usize) -> Option<Vec<PythonLiteral>> {
     let mut out = Vec::new();
     loop {
         skip(text);

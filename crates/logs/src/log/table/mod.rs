@@ -33,7 +33,7 @@ struct TableFormat {
 const FORMATS: &[TableFormat] = &[
     TableFormat {
         is: |head| head.starts_with(b"\x93NUMPY"),
-        open: |(_, file, _)| numpy::table(vec![npy::Array::of_file(file)?]),
+        open: |(_, file, _)| numpy::table(vec![npy::NpyArray::of_file(file)?]),
     },
     TableFormat {
         is: |head| head.starts_with(b"PK\x03\x04"),
@@ -60,7 +60,7 @@ pub(super) fn is_table(head: &[u8]) -> bool {
 
 /// Arrays of numpy in an archive.
 fn archive(file: &OpenFile) -> io::Result<TableText> {
-    let arrays = npy::Array::of_members(file, zip::members(file)?)?;
+    let arrays = npy::NpyArray::of_members(file, zip::members(file)?)?;
     match arrays.is_empty() {
         true => Err(lines::unusable(
             "it is an archive without arrays of numpy (Excel's .xlsx, or a .zip): save the sheet as CSV, `python -c \"import pandas; pandas.read_excel('IN').to_csv('OUT.csv', index=False)\"`, or unpack the archive".to_owned(),

@@ -4,21 +4,23 @@ use std::io::{self, BufReader, Read, Write};
 
 use super::super::held_files::OpenFile;
 use super::lines::{damaged, number};
-use super::literal::Literal;
-use super::zip::{self, Member};
+use super::literal::PythonLiteral;
+use super::zip::{self, ZipMember};
 
 /// Largest head of an array [bytes].
 const HEAD: usize = 1 << 16;
 
+/// The type of an array's numbers: kind, size in bytes and order of bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Scalar {
-    kind: Kind,
+pub(super) struct ScalarType {
+    kind: ScalarKind,
     bytes: usize,
     big_endian: bool,
 }
 
+/// The kinds of numbers of a NumPy array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum ScalarKind {
     Float,
     Signed,
     Unsigned,
@@ -34,7 +36,7 @@ pub(super) struct Field {
     pub(super) name: String,
     /// Where it stands in the element [bytes].
     pub(super) at: usize,
-    pub(super) scalar: Scalar,
+    pub(super) scalar: ScalarType,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -45,16 +47,17 @@ pub(super) struct Element {
     pub(super) named: bool,
 }
 
-enum Place {
+/// The file that holds an array: one of its own, or a member of an archive.
+enum ArrayPlace {
     File(OpenFile),
-    Member(OpenFile, Member),
+    Member(OpenFile, ZipMember),
 }
 
 /// An array whose head was read.
-pub(super) struct Array {
+pub(super) struct NpyArray {
     /// Its name; none where it is a file of its own.
     pub(super) name: String,
-    place: Place,
+    place: ArrayPlace,
     /// Where its numbers begin.
     begin: u64,
     pub(super) shape: Vec<u64>,
@@ -64,20 +67,20 @@ pub(super) struct Array {
     pub(super) element: Option<Element>,
 }
 
-impl Array {
+impl NpyArray {
     pub(super) fn of_file(file: &OpenFile) -> io::Result<Self> {
-        Self::new(String::new(), Place::File(file.from(0)))
+        Self::new(String::new(), ArrayPlace::File(file.from(0)))
     }
 
-    pub(super) fn of_members(file: &OpenFile, members: Vec<Member>) -> io::Result<Vec<Self>> {
+    pub(super) fn of_members(file: &OpenFile, members: Vec<ZipMember>) -> io::Result<Vec<Self>> {
         let arrays = members.into_iter().filter_map(|member| {
             let name = member.name.strip_suffix(".npy")?.to_owned();
-            Some(Self::new(name, Place::Member(file.from(0), member)))
+            Some(Self::new(name, ArrayPlace::Member(file.from(0), member)))
         });
         arrays.collect()
     }
 
-    fn new(name: String, place: Place) -> io::Result<Self> {
+    fn new(name: String, place: ArrayPlace) -> io::Result<Self> {
         let mut file = place.reader(0)?;
         let mut first = [0; 8];
         file.read_exact(&mut first)?;
@@ -95,14 +98,14 @@ impl Array {
         file.read_exact(&mut head)?;
         let text = String::from_utf8_lossy(&head);
         let unread = || damaged("the head of an array cannot be read");
-        let head = Literal::parse(&text).ok_or_else(unread)?;
-        let shape = head.get("shape").and_then(Literal::wholes);
+        let head = PythonLiteral::parse(&text).ok_or_else(unread)?;
+        let shape = head.get("shape").and_then(PythonLiteral::wholes);
         Ok(Self {
             name,
             begin: (8 + wide + count) as u64,
             place,
             shape: shape.ok_or_else(unread)?,
-            by_columns: head.get("fortran_order") == Some(&Literal::Truth(true)),
+            by_columns: head.get("fortran_order") == Some(&PythonLiteral::Truth(true)),
             element: head.get("descr").and_then(Element::of),
         })
     }
@@ -113,7 +116,7 @@ impl Array {
     }
 }
 
-impl Place {
+impl ArrayPlace {
     fn reader(&self, from: u64) -> io::Result<Box<dyn Read + Send>> {
         match self {
             Self::File(file) => Ok(Box::new(BufReader::new(file.from(from)))),
@@ -124,10 +127,10 @@ impl Place {
 
 impl Element {
     /// The element that numpy describes; `None` where it is, or has, no number.
-    fn of(described: &Literal) -> Option<Self> {
+    fn of(described: &PythonLiteral) -> Option<Self> {
         let fields = match described {
-            Literal::Text(text) => {
-                let (scalar, name) = Scalar::of(text)?;
+            PythonLiteral::Text(text) => {
+                let (scalar, name) = ScalarType::of(text)?;
                 let at = 0;
                 return Some(Self {
                     fields: vec![Field { name, at, scalar }],
@@ -135,7 +138,7 @@ impl Element {
                     named: false,
                 });
             }
-            Literal::List(fields) => fields,
+            PythonLiteral::List(fields) => fields,
             _ => return None,
         };
         let mut out = Self {
@@ -143,17 +146,22 @@ impl Element {
             ..Self::default()
         };
         for field in fields {
-            let Literal::List(parts) = field else {
+            let PythonLiteral::List(parts) = field else {
                 return None;
             };
-            let [Literal::Text(name), Literal::Text(described), shape @ ..] = &parts[..] else {
+            let [
+                PythonLiteral::Text(name),
+                PythonLiteral::Text(described),
+                shape @ ..,
+            ] = &parts[..]
+            else {
                 return None;
             };
             let count = match shape.first() {
                 None => None,
                 Some(shape) => Some(shape.wholes()?.into_iter().try_fold(1, u64::checked_mul)?),
             };
-            let number = Scalar::of(described);
+            let number = ScalarType::of(described);
             let size = match &number {
                 Some((scalar, _)) => scalar.bytes,
                 None => text_bytes(described)?,
@@ -188,17 +196,17 @@ fn text_bytes(described: &str) -> Option<usize> {
     signs.as_str().parse::<usize>().ok()?.checked_mul(each)
 }
 
-impl Scalar {
+impl ScalarType {
     /// The number that `<f8` describes, and the unit of a time in brackets.
     fn of(described: &str) -> Option<(Self, String)> {
         let big_endian = described.starts_with('>');
         let mut signs = described.trim_start_matches(['<', '>', '|', '=']).chars();
         let kind = match signs.next()? {
-            'f' => Kind::Float,
-            'i' => Kind::Signed,
-            'u' => Kind::Unsigned,
-            'b' => Kind::Truth,
-            'M' | 'm' => Kind::Time,
+            'f' => ScalarKind::Float,
+            'i' => ScalarKind::Signed,
+            'u' => ScalarKind::Unsigned,
+            'b' => ScalarKind::Truth,
+            'M' | 'm' => ScalarKind::Time,
             _ => return None,
         };
         let (bytes, unit) = signs
@@ -207,13 +215,13 @@ impl Scalar {
             .unwrap_or((signs.as_str(), ""));
         let (bytes, unit) = (bytes.parse().ok()?, unit.trim_end_matches(']'));
         let known = match kind {
-            Kind::Float => matches!(bytes, 2 | 4 | 8),
-            Kind::Signed | Kind::Unsigned => matches!(bytes, 1 | 2 | 4 | 8),
-            Kind::Truth => bytes == 1,
-            Kind::Time => bytes == 8 && ["s", "ms", "us", "ns"].contains(&unit),
+            ScalarKind::Float => matches!(bytes, 2 | 4 | 8),
+            ScalarKind::Signed | ScalarKind::Unsigned => matches!(bytes, 1 | 2 | 4 | 8),
+            ScalarKind::Truth => bytes == 1,
+            ScalarKind::Time => bytes == 8 && ["s", "ms", "us", "ns"].contains(&unit),
         };
         let unit = match kind {
-            Kind::Time => format!(" [{unit}]"),
+            ScalarKind::Time => format!(" [{unit}]"),
             _ => String::new(),
         };
         let scalar = Self {
@@ -233,14 +241,16 @@ impl Scalar {
         let plain = u64::from_le_bytes(word);
         let signed = || (plain << (64 - 8 * self.bytes)).cast_signed() >> (64 - 8 * self.bytes);
         match self.kind {
-            Kind::Float if self.bytes == 8 => number(line, f64::from_bits(plain)),
-            Kind::Float if self.bytes == 4 => number(line, f64::from(f32::from_bits(plain as u32))),
-            Kind::Float => number(line, half(plain as u16)),
-            Kind::Unsigned | Kind::Truth => write!(line, "{plain}"),
-            Kind::Signed => write!(line, "{}", signed()),
+            ScalarKind::Float if self.bytes == 8 => number(line, f64::from_bits(plain)),
+            ScalarKind::Float if self.bytes == 4 => {
+                number(line, f64::from(f32::from_bits(plain as u32)))
+            }
+            ScalarKind::Float => number(line, half(plain as u16)),
+            ScalarKind::Unsigned | ScalarKind::Truth => write!(line, "{plain}"),
+            ScalarKind::Signed => write!(line, "{}", signed()),
             // "not a time"
-            Kind::Time if signed() == i64::MIN => Ok(()),
-            Kind::Time => write!(line, "{}", signed()),
+            ScalarKind::Time if signed() == i64::MIN => Ok(()),
+            ScalarKind::Time => write!(line, "{}", signed()),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 
 use super::lines::{COLUMNS, Table, TableText, unusable};
-use super::npy::{Array, Field};
+use super::npy::{Field, NpyArray};
 
 /// Columns of an array whose columns lie one behind the other, each of which is read from a place of its own.
 const MAX_COLUMNS_APART: u64 = 256;
@@ -25,7 +25,7 @@ pub(super) struct ArrayTable {
 }
 
 /// Axes of an array, those of one element aside.
-fn axes(array: &Array) -> Vec<u64> {
+fn axes(array: &NpyArray) -> Vec<u64> {
     match array.shape.len() {
         0..=2 => array.shape.clone(),
         _ => (array.shape.iter().copied().filter(|count| *count != 1)).collect(),
@@ -33,7 +33,7 @@ fn axes(array: &Array) -> Vec<u64> {
 }
 
 /// The number of rows: that of the times, else that which most arrays have along an axis.
-fn rows_of(arrays: &[Array]) -> Option<u64> {
+fn rows_of(arrays: &[NpyArray]) -> Option<u64> {
     let numbers = || arrays.iter().filter(|array| array.element.is_some());
     let timed = numbers().find(|array| TIMES.contains(&&*array.name.to_lowercase()));
     if let Some(array) = timed {
@@ -50,14 +50,14 @@ fn rows_of(arrays: &[Array]) -> Option<u64> {
 }
 
 /// The table that arrays make up.
-pub(super) fn table(arrays: Vec<Array>) -> io::Result<TableText> {
+pub(super) fn table(arrays: Vec<NpyArray>) -> io::Result<TableText> {
     let (table, notes) = ArrayTable::new(arrays)?;
     Ok(TableText::new(&table.names.clone(), table, notes))
 }
 
 impl ArrayTable {
     /// The table that arrays make up, and what is left out of it.
-    pub(super) fn new(arrays: Vec<Array>) -> io::Result<(Self, Vec<String>)> {
+    pub(super) fn new(arrays: Vec<NpyArray>) -> io::Result<(Self, Vec<String>)> {
         let Some(rows) = rows_of(&arrays) else {
             return Err(unusable("it holds no array of numbers".to_owned()));
         };
@@ -88,7 +88,7 @@ impl ArrayTable {
     }
 
     /// Adds the columns of an array; false where it has none of so many rows.
-    fn add(&mut self, array: &Array, rows: u64) -> io::Result<bool> {
+    fn add(&mut self, array: &NpyArray, rows: u64) -> io::Result<bool> {
         let Some(element) = &array.element else {
             return Ok(false);
         };

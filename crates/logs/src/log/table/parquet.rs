@@ -35,11 +35,11 @@ struct ParquetTable {
     /// The first row, read for its widths.
     first: Option<Row>,
     number: u64,
-    clock: Option<Clock>,
+    clock: Option<EpisodeClock>,
 }
 
 /// Times of the frames of a dataset, episode after episode.
-struct Clock {
+struct EpisodeClock {
     fps: f64,
     /// Places of `frame_index` and `episode_index` among the columns.
     frame: usize,
@@ -80,7 +80,9 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
             return Err(unusable(format!("more than {COLUMNS} columns")));
         }
     }
-    let clock = described.as_ref().and_then(|all| Clock::of(all, &columns));
+    let clock = described
+        .as_ref()
+        .and_then(|all| EpisodeClock::of(all, &columns));
     if clock.is_some() {
         names.insert(0, "time [s]".to_owned());
         notes.push(format!(
@@ -293,7 +295,7 @@ fn list_of(described: &serde_json::Value, column: &str) -> Option<Vec<String>> {
     texts.map(|name| Some(name.as_str()?.to_owned())).collect()
 }
 
-impl Clock {
+impl EpisodeClock {
     fn of(described: &serde_json::Value, columns: &[Column]) -> Option<Self> {
         let place = |name: &str| columns.iter().position(|column| column.name == name);
         let fps = described["fps"].as_f64().filter(|fps| *fps > 0.0)?;

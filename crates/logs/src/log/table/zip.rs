@@ -10,8 +10,9 @@ const END: u64 = 65_557;
 /// Largest directory that is read [bytes].
 const DIRECTORY: u64 = 1 << 24;
 
+/// A file in a zip archive.
 #[derive(Debug, Clone)]
-pub(super) struct Member {
+pub(super) struct ZipMember {
     pub(super) name: String,
     packed: bool,
     /// Where its local header begins, and how many bytes it takes.
@@ -40,7 +41,7 @@ fn piece(file: &OpenFile, at: u64, count: u64) -> io::Result<Vec<u8>> {
 }
 
 /// The members, as the directory at the end of the archive lists them.
-pub(super) fn members(file: &OpenFile) -> io::Result<Vec<Member>> {
+pub(super) fn members(file: &OpenFile) -> io::Result<Vec<ZipMember>> {
     let length = file.metadata()?.len();
     let tail = piece(file, length - length.min(END), length.min(END))?;
     let end = tail
@@ -80,7 +81,7 @@ pub(super) fn members(file: &OpenFile) -> io::Result<Vec<Member>> {
                 )));
             }
         };
-        out.push(Member {
+        out.push(ZipMember {
             name: String::from_utf8_lossy(text(46, name)).into_owned(),
             packed,
             header,
@@ -117,7 +118,7 @@ fn sizes(entry: &[u8], mut extra: &[u8]) -> io::Result<[u64; 2]> {
 /// The bytes of a member, from one on.
 pub(super) fn reader(
     file: &OpenFile,
-    member: &Member,
+    member: &ZipMember,
     from: u64,
 ) -> io::Result<Box<dyn Read + Send>> {
     let local = piece(file, member.header, 30)?;

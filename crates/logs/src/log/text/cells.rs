@@ -1,6 +1,6 @@
 //! Tables whose rows or cells hold more than one number a column: a row for each joint, lists in cells.
 
-use super::line::{Line, Parting};
+use super::line::{FieldParting, Line};
 use super::number;
 use super::table::is_datum;
 use crate::log::time::Instant;
@@ -10,7 +10,7 @@ use crate::log::{LogError, escape};
 const ROWS: usize = 400;
 
 /// Fields of a line; what stands in quotes is one.
-fn fields(line: &str, parting: Parting) -> Vec<&str> {
+fn fields(line: &str, parting: FieldParting) -> Vec<&str> {
     let (mut out, mut quoted, mut from) = (Vec::new(), false, 0);
     for (at, byte) in line.bytes().enumerate() {
         quoted ^= byte == b'"';
@@ -57,7 +57,7 @@ pub(super) fn check(
     header: &[String],
     lines: &[Line<'_>],
     rows: &[usize],
-    parting: Parting,
+    parting: FieldParting,
 ) -> Result<(), LogError> {
     let all = rows
         .iter()
@@ -157,7 +157,7 @@ mod tests {
         let lines = lines_of(text.as_bytes());
         let header: Vec<String> = lines[0].text.split(',').map(str::to_owned).collect();
         let rows: Vec<usize> = (1..lines.len() - 1).collect();
-        let parting = Parting {
+        let parting = FieldParting {
             sign: b',',
             runs: false,
         };

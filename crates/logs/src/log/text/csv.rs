@@ -4,22 +4,22 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::listed::ListedJoints;
-use super::records::{BUFFER, LONGEST_ROW, Record, Records};
-use super::table::Found;
+use super::records::{BUFFER, LONGEST_ROW, TextRecord, TextRecords};
+use super::table::TextTable;
 use super::{head, number};
-use crate::log::content::Content;
+use crate::log::content::FileContent;
 use crate::log::layout::Layout;
-use crate::log::rows::{Strictness, counted};
-use crate::log::stream::Hashed;
+use crate::log::rows::{RowStrictness, counted};
+use crate::log::stream::HashedReader;
 use crate::log::time::Instant;
 use crate::log::{LogError, escape, source};
 use cft_ident_core::number::beyond;
 
 pub(super) struct TextFile {
     pub(super) path: PathBuf,
-    reader: Records,
-    record: Record,
-    previous: Record,
+    reader: TextRecords,
+    record: TextRecord,
+    previous: TextRecord,
     /// Names of the columns, trimmed, and the line on which they stand.
     pub(super) header: Vec<String>,
     pub(super) header_line: u64,
@@ -35,7 +35,7 @@ pub(super) struct TextFile {
     clocks: Vec<usize>,
     /// The record is a row that was not handed out yet.
     ahead: bool,
-    strictness: Strictness,
+    strictness: RowStrictness,
     /// Rows that were passed over because of their width.
     pub(super) malformed: u64,
     blank: u64,
@@ -44,20 +44,20 @@ pub(super) struct TextFile {
     notes: Vec<String>,
     /// The rows are those of a table without lines.
     table: bool,
-    watch: Option<Hashed>,
+    watch: Option<HashedReader>,
 }
 
 impl TextFile {
     pub(super) fn open(
         path: &Path,
-        content: Content,
+        content: FileContent,
         layout: &Layout,
-        strictness: Strictness,
+        strictness: RowStrictness,
     ) -> Result<Self, LogError> {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
         let found = head::look_at(path, begin, layout)?;
-        let Found { parting, units, .. } = found.table;
+        let TextTable { parting, units, .. } = found.table;
         let watch = content.watch.clone();
         let (table, notes) = (content.table, content.notes.clone());
         let mut inner = content.into_bytes();
@@ -66,9 +66,9 @@ impl TextFile {
         passed.map_err(|error| source::failed(path, error))?;
         let mut rows = Self {
             path: path.to_owned(),
-            reader: Records::new(inner, parting.sign, found.comment),
-            record: Record::default(),
-            previous: Record::default(),
+            reader: TextRecords::new(inner, parting.sign, found.comment),
+            record: TextRecord::default(),
+            previous: TextRecord::default(),
             header: Vec::new(),
             header_line: found.header_line,
             runs: parting.runs.then(Vec::new),
@@ -221,8 +221,8 @@ impl TextFile {
                 return Ok(false);
             }
             match self.strictness {
-                Strictness::Record => self.malformed += 1,
-                Strictness::Refuse => return Err(self.wrong_width(found, end)),
+                RowStrictness::Record => self.malformed += 1,
+                RowStrictness::Refuse => return Err(self.wrong_width(found, end)),
             }
         }
     }
@@ -459,7 +459,7 @@ fn with_point(field: &[u8]) -> Vec<u8> {
 
 /// 1 + the line ends among the first `end` bytes; `\r\n` and a lone `\r` count as one each.
 fn count_lines(path: &Path, end: u64) -> io::Result<u64> {
-    let content = Content::open(path).map_err(io::Error::other)?;
+    let content = FileContent::open(path).map_err(io::Error::other)?;
     let mut file = content.into_bytes().take(end);
     let mut buffer = vec![0; BUFFER];
     let (mut lines, mut after_return) = (1, false);

@@ -4,16 +4,17 @@ use std::path::Path;
 
 use super::cells;
 use super::header::HeaderLines;
-use super::line::{Line, Parting, lines_of};
+use super::line::{FieldParting, Line, lines_of};
 use super::listed::echo_names;
-use super::table::{self, Found};
+use super::table::{self, TextTable};
 use crate::log::content::{DOCUMENT, HEAD};
 use crate::log::layout::Layout;
 use crate::log::{LogError, source};
 
-pub(super) struct Head {
+/// What the first lines of a text log say of the others.
+pub(super) struct TextHead {
     pub(super) comment: u8,
-    pub(super) table: Found,
+    pub(super) table: TextTable,
     /// Column names that stand in a comment line, as numpy writes them, or in several lines above the numbers.
     pub(super) names: Option<Vec<String>>,
     /// Fields of the first row below them.
@@ -151,7 +152,7 @@ pub(super) fn refuse_other_formats(path: &Path, head: &[u8]) -> Result<(), LogEr
     })
 }
 
-pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head, LogError> {
+pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<TextHead, LogError> {
     let file = || source::shown(path);
     let lines = lines_of(head);
     let (mut comment, mut comments) = (None, Vec::new());
@@ -194,7 +195,7 @@ pub(super) fn look_at(path: &Path, head: &[u8], layout: &Layout) -> Result<Head,
     let (at, parting) = (table.at, table.parting);
     let (line, number) = (&lines[at].text, lines[at].number);
     let fields = parting.split(line);
-    let mut out = Head {
+    let mut out = TextHead {
         comment,
         table,
         names: None,
@@ -265,7 +266,7 @@ fn is_row(
     fields: &[&str],
     lines: &[Line<'_>],
     rows: &[usize],
-    (at, parting): (usize, Parting),
+    (at, parting): (usize, FieldParting),
 ) -> bool {
     let numbers = |fields: &[&str]| -> Vec<bool> {
         fields.iter().map(|field| table::is_datum(field)).collect()
@@ -277,7 +278,7 @@ fn is_row(
 }
 
 /// Whether numbers have commas for points, and none has a point.
-fn has_commas(lines: &[Line<'_>], rows: &[usize], parting: Parting) -> bool {
+fn has_commas(lines: &[Line<'_>], rows: &[usize], parting: FieldParting) -> bool {
     if parting.sign == b',' {
         return false;
     }
@@ -303,17 +304,17 @@ fn owned(fields: Vec<&str>) -> Vec<String> {
 fn of_several_lines(
     lines: &[Line<'_>],
     rows: &[usize],
-    table: &Found,
+    table: &TextTable,
     comment: u8,
     layout: &Layout,
-) -> Option<Head> {
+) -> Option<TextHead> {
     let asked = layout.section.delimiter;
     let found = HeaderLines::find(lines, rows, table.at, asked)?;
-    let parting = Parting::of(&lines[*rows.last()?].text, asked);
+    let parting = FieldParting::of(&lines[*rows.last()?].text, asked);
     let data = &lines[found.data];
-    Some(Head {
+    Some(TextHead {
         comment,
-        table: Found {
+        table: TextTable {
             at: found.line,
             parting,
             second_row: false,
@@ -331,8 +332,8 @@ fn of_several_lines(
 }
 
 /// Lines of `ros2 topic echo --csv`, which prints no names.
-fn of_echo(lines: &[Line<'_>], rows: &[usize], comment: u8) -> Option<Head> {
-    let parting = Parting {
+fn of_echo(lines: &[Line<'_>], rows: &[usize], comment: u8) -> Option<TextHead> {
+    let parting = FieldParting {
         sign: b',',
         runs: false,
     };
@@ -340,9 +341,9 @@ fn of_echo(lines: &[Line<'_>], rows: &[usize], comment: u8) -> Option<Head> {
     let all: Vec<Vec<&str>> = rows.iter().map(split).collect();
     let names = echo_names(&all)?;
     let first = &lines[rows[0]];
-    Some(Head {
+    Some(TextHead {
         comment,
-        table: Found {
+        table: TextTable {
             at: rows[0],
             parting,
             second_row: false,

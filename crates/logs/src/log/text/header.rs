@@ -1,9 +1,9 @@
 //! Names that stand in several lines above the numbers, as pandas, Simulink, LabVIEW and TwinCAT write them.
 
-use super::line::{Line, Parting};
+use super::line::{FieldParting, Line};
 use super::number;
 use super::table::{are_units, is_datum};
-use crate::log::section::Delimiter;
+use crate::log::section::ColumnDelimiter;
 
 /// What the lines above the numbers say of the columns.
 #[derive(Debug, Default, PartialEq)]
@@ -24,7 +24,7 @@ const MIN_ROWS: usize = 3;
 const MAX_LINES: usize = 32;
 
 /// Whether a field is a number, with a decimal comma where those part no fields.
-fn is_number(field: &str, parting: Parting) -> bool {
+fn is_number(field: &str, parting: FieldParting) -> bool {
     let point = field.replace(',', ".");
     is_datum(field) || (parting.sign != b',' && number::parse(point.as_bytes()).is_some())
 }
@@ -66,10 +66,10 @@ impl HeaderLines {
         lines: &[Line<'_>],
         rows: &[usize],
         plain: usize,
-        asked: Delimiter,
+        asked: ColumnDelimiter,
     ) -> Option<Self> {
         let last = &lines[*rows.last()?].text;
-        let parting = Parting::of(last, asked);
+        let parting = FieldParting::of(last, asked);
         let fields = |row: usize| parting.split(&lines[rows[row]].text);
         let of_numbers = |row: usize| {
             let fields = fields(row);
@@ -168,7 +168,7 @@ impl HeaderLines {
         &mut self,
         block: &[usize],
         fields: &dyn Fn(usize) -> Vec<&'f str>,
-        parting: Parting,
+        parting: FieldParting,
     ) -> bool {
         let keyed = block
             .iter()
@@ -200,7 +200,7 @@ impl HeaderLines {
         &mut self,
         block: &[usize],
         fields: &dyn Fn(usize) -> Vec<&'f str>,
-        parting: Parting,
+        parting: FieldParting,
         first: &[&str],
     ) -> bool {
         let mut levels: Vec<Vec<&str>> = block.iter().map(|row| fields(*row)).collect();
@@ -257,7 +257,7 @@ impl HeaderLines {
         &mut self,
         block: &[usize],
         fields: &dyn Fn(usize) -> Vec<&'f str>,
-        parting: Parting,
+        parting: FieldParting,
         rows: &[usize],
         plain: usize,
     ) -> bool {
@@ -308,7 +308,7 @@ mod tests {
         let rows: Vec<usize> = (0..lines.len())
             .filter(|k| !lines[*k].text.trim().is_empty())
             .collect();
-        HeaderLines::find(&lines, &rows, plain, Delimiter::Auto)
+        HeaderLines::find(&lines, &rows, plain, ColumnDelimiter::Auto)
     }
 
     const ROWS: &str = "0,1.5,2.5\n0.1,1.6,2.6\n0.2,1.7,2.7\n";

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use crate::log::columns::choose;
-use crate::log::content::{Bytes, Content};
+use crate::log::content::{ContentBytes, FileContent};
 use crate::log::layout::{Channel, Layout};
 use crate::log::rows::LogRows;
-use crate::log::stream::Hashed;
-use crate::log::time::Stamped;
+use crate::log::stream::HashedReader;
+use crate::log::time::RowTime;
 use crate::log::{Block, LogError, escape, source};
 use cft_ident_core::number::is_usable;
 
@@ -20,18 +20,19 @@ const LONGEST_LINE: usize = 1 << 20;
 
 pub(in crate::log) struct JsonRows {
     path: PathBuf,
-    reader: BufReader<Bytes>,
-    watch: Option<Hashed>,
+    reader: BufReader<ContentBytes>,
+    watch: Option<HashedReader>,
     line: Vec<u8>,
     number: u64,
     at: u64,
-    slots: Slots,
+    slots: KeySlots,
     /// Numbers of the current row: time, positions, torques, velocities; NaN where none stands.
     values: Vec<f64>,
 }
 
+/// Which channels the keys of a line fill.
 #[derive(Default)]
-struct Slots {
+struct KeySlots {
     keys: Vec<(String, usize)>,
     /// Lists in joint order: key, first place, length.
     lists: [(&'static str, usize, usize); 3],
@@ -39,7 +40,7 @@ struct Slots {
     scales: Vec<[f64; 2]>,
 }
 
-impl Slots {
+impl KeySlots {
     fn of(layout: &Layout) -> Self {
         let (n, k) = (layout.positions.len(), layout.torques.len());
         let parts = [&layout.positions, &layout.torques, &layout.velocities];
@@ -47,7 +48,7 @@ impl Slots {
         let scale = |c: &Channel| [c.factor, c.offset];
         let scales: Vec<[f64; 2]> = channels.clone().map(scale).collect();
         let keys = channels.enumerate();
-        Slots {
+        KeySlots {
             keys: keys.map(|(place, c)| (c.column.clone(), place)).collect(),
             lists: [
                 ("q", 1, n),
@@ -62,7 +63,7 @@ impl Slots {
 impl JsonRows {
     pub(in crate::log) fn open(
         path: &Path,
-        content: Content,
+        content: FileContent,
         layout: &Layout,
     ) -> Result<(Self, Layout), LogError> {
         let watch = content.watch.clone();
@@ -73,11 +74,11 @@ impl JsonRows {
             line: Vec::with_capacity(4096),
             number: 0,
             at: 0,
-            slots: Slots::default(),
+            slots: KeySlots::default(),
             values: Vec::new(),
         };
         let layout = choose(&keys(rows.peek()?, layout), layout);
-        rows.slots = Slots::of(&layout);
+        rows.slots = KeySlots::of(&layout);
         rows.values = vec![f64::NAN; rows.slots.scales.len()];
         Ok((rows, layout))
     }
@@ -123,7 +124,7 @@ impl JsonRows {
 }
 
 impl LogRows for JsonRows {
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         if !self.advance()? {
             return Ok(None);
         }
@@ -143,7 +144,7 @@ impl LogRows for JsonRows {
         }
         let t = self.values[0];
         match is_usable(t) {
-            true => Ok(Some(Stamped::Seconds(t))),
+            true => Ok(Some(RowTime::Seconds(t))),
             false => {
                 let key = escape(&self.slots.keys[0].0);
                 Err(self.wrong(format!("has no number `{key}`, the time")))
@@ -196,7 +197,7 @@ fn keys(line: &[u8], layout: &Layout) -> Vec<String> {
 }
 
 struct Row<'a> {
-    slots: &'a Slots,
+    slots: &'a KeySlots,
     values: &'a mut [f64],
 }
 
@@ -218,61 +219,63 @@ impl<'de> Visitor<'de> for Row<'_> {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
         while let Some(place) = map.next_key_seed(Key(self.slots))? {
             match place {
-                Place::Number(i) => {
+                KeyPlace::Number(i) => {
                     let [factor, offset] = self.slots.scales[i];
                     self.values[i] = map.next_value::<f64>()? * factor + offset;
                 }
-                Place::List(first, length) => map.next_value_seed(List {
+                KeyPlace::List(first, length) => map.next_value_seed(ValueList {
                     scales: &self.slots.scales[first..first + length],
                     values: &mut self.values[first..first + length],
                 })?,
-                Place::None => drop(map.next_value::<IgnoredAny>()?),
+                KeyPlace::None => drop(map.next_value::<IgnoredAny>()?),
             }
         }
         Ok(())
     }
 }
 
-enum Place {
+/// Where the value of a key goes.
+enum KeyPlace {
     Number(usize),
     List(usize, usize),
     None,
 }
 
-struct Key<'a>(&'a Slots);
+struct Key<'a>(&'a KeySlots);
 
 impl<'de> DeserializeSeed<'de> for Key<'_> {
-    type Value = Place;
+    type Value = KeyPlace;
 
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Place, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<KeyPlace, D::Error> {
         deserializer.deserialize_identifier(self)
     }
 }
 
 impl Visitor<'_> for Key<'_> {
-    type Value = Place;
+    type Value = KeyPlace;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str("a key")
     }
 
-    fn visit_str<E: Error>(self, key: &str) -> Result<Place, E> {
+    fn visit_str<E: Error>(self, key: &str) -> Result<KeyPlace, E> {
         let named = self.0.keys.iter().find(|(name, _)| name == key);
         let listed = self.0.lists.iter().find(|(name, ..)| *name == key);
         Ok(match (named, listed) {
-            (Some((_, place)), _) => Place::Number(*place),
-            (None, Some((_, first, length))) => Place::List(*first, *length),
-            (None, None) => Place::None,
+            (Some((_, place)), _) => KeyPlace::Number(*place),
+            (None, Some((_, first, length))) => KeyPlace::List(*first, *length),
+            (None, None) => KeyPlace::None,
         })
     }
 }
 
-struct List<'a> {
+/// A list of numbers, each of which is written to its channel in SI units.
+struct ValueList<'a> {
     scales: &'a [[f64; 2]],
     values: &'a mut [f64],
 }
 
-impl<'de> DeserializeSeed<'de> for List<'_> {
+impl<'de> DeserializeSeed<'de> for ValueList<'_> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
@@ -280,7 +283,7 @@ impl<'de> DeserializeSeed<'de> for List<'_> {
     }
 }
 
-impl<'de> Visitor<'de> for List<'_> {
+impl<'de> Visitor<'de> for ValueList<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::log::content::HEAD;
-use crate::log::section::Delimiter;
+use crate::log::section::ColumnDelimiter;
 
 pub(super) struct Line<'h> {
     pub(super) text: Cow<'h, str>,
@@ -36,15 +36,15 @@ pub(super) fn lines_of(head: &[u8]) -> Vec<Line<'_>> {
 
 /// How the fields of a line are parted.
 #[derive(Clone, Copy)]
-pub(super) struct Parting {
+pub(super) struct FieldParting {
     pub(super) sign: u8,
     /// Runs of it count as one.
     pub(super) runs: bool,
 }
 
-impl Parting {
+impl FieldParting {
     /// As it is asked for, else by the signs in the line that names the columns.
-    pub(super) fn of(line: &str, asked: Delimiter) -> Self {
+    pub(super) fn of(line: &str, asked: ColumnDelimiter) -> Self {
         let count = |sign: u8| {
             let mut quoted = false;
             let outside = line.bytes().filter(|byte| {
@@ -54,11 +54,11 @@ impl Parting {
             outside.count()
         };
         let sign = match asked {
-            Delimiter::Comma => b',',
-            Delimiter::Semicolon => b';',
-            Delimiter::Tab => b'\t',
-            Delimiter::Space => b' ',
-            Delimiter::Auto => {
+            ColumnDelimiter::Comma => b',',
+            ColumnDelimiter::Semicolon => b';',
+            ColumnDelimiter::Tab => b'\t',
+            ColumnDelimiter::Space => b' ',
+            ColumnDelimiter::Auto => {
                 // of signs that stand there as often the first one
                 let most = [b'\t', b';', b',']
                     .into_iter()

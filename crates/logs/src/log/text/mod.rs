@@ -16,10 +16,10 @@ use std::path::Path;
 use self::csv::TextFile;
 pub(super) use self::json_lines::JsonRows;
 use super::columns::{Header, ScaledColumn, ScaledColumns, choose};
-use super::content::Content;
+use super::content::FileContent;
 use super::layout::Layout;
-use super::rows::{LogRows, Strictness};
-use super::time::{FAR_S, Instant, Stamped};
+use super::rows::{LogRows, RowStrictness};
+use super::time::{FAR_S, Instant, RowTime};
 use super::two_clocks::rest_of;
 use super::{Block, LogError, escape};
 use cft_ident_core::number::is_usable;
@@ -46,7 +46,7 @@ pub(super) struct TextRows {
     time: Option<TimeColumn>,
     /// Rate of a log without times [Hz], and rows so far.
     even: Option<(f64, u64)>,
-    strictness: Strictness,
+    strictness: RowStrictness,
     /// The last time of day, and the days that have passed.
     of_day: (Option<Instant>, u32),
     /// What the log was opened by, to look at its beginning again.
@@ -57,9 +57,9 @@ impl TextRows {
     /// Finds the columns; the layout that the log turns out to have, and what keeps a strict reader from it.
     pub(super) fn open(
         path: &Path,
-        content: Content,
+        content: FileContent,
         layout: &Layout,
-        strictness: Strictness,
+        strictness: RowStrictness,
     ) -> Result<(Self, Layout, Option<LogError>), LogError> {
         let file = TextFile::open(path, content, layout, strictness)?;
         let header = Header {
@@ -70,8 +70,8 @@ impl TextRows {
         let layout = choose(header.names, layout);
         let (columns, refused) = match (header.columns(&layout), strictness) {
             (Ok(columns), _) => (columns, None),
-            (Err(error), Strictness::Refuse) => return Err(error),
-            (Err(error), Strictness::Record) => (ScaledColumns::default(), Some(error)),
+            (Err(error), RowStrictness::Refuse) => return Err(error),
+            (Err(error), RowStrictness::Record) => (ScaledColumns::default(), Some(error)),
         };
         let mut rows = Self {
             file,
@@ -89,16 +89,16 @@ impl TextRows {
     }
 
     #[inline]
-    fn stamp(&mut self) -> Option<Stamped> {
+    fn stamp(&mut self) -> Option<RowTime> {
         if let Some((rate, row)) = &mut self.even {
             let t = *row as f64 / *rate;
             *row += 1;
-            return Some(Stamped::Seconds(t));
+            return Some(RowTime::Seconds(t));
         }
         let (file, time) = (&self.file, self.time.as_mut()?);
         if let Some((rest, power)) = time.rest {
             let whole = file.instant(time.index, 0)?;
-            return Some(Stamped::Exact(whole.and(file.instant(rest, power)?)));
+            return Some(RowTime::Exact(whole.and(file.instant(rest, power)?)));
         }
         let seconds = || {
             let seconds = file.number(time.index)? * time.seconds;
@@ -123,7 +123,7 @@ impl TextRows {
             Some(power) => {
                 let instant = file.instant(time.index, power)?;
                 if !file.is_time_of_day(time.index) {
-                    return Some(Stamped::Exact(instant));
+                    return Some(RowTime::Exact(instant));
                 }
                 let (last, days) = &mut self.of_day;
                 // time of day begins anew at midnight
@@ -131,11 +131,11 @@ impl TextRows {
                     last.is_some_and(|last| instant.seconds() < last.seconds() - HALF_A_DAY_S),
                 );
                 *last = Some(instant);
-                Some(Stamped::Exact(
+                Some(RowTime::Exact(
                     instant.plus(f64::from(*days) * 2.0 * HALF_A_DAY_S),
                 ))
             }
-            None => seconds().map(Stamped::Seconds),
+            None => seconds().map(RowTime::Seconds),
         }
     }
 }
@@ -154,14 +154,14 @@ impl LogRows for TextRows {
         &self.file.header
     }
 
-    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+    fn next(&mut self) -> Result<Option<RowTime>, LogError> {
         if !self.file.next()? {
             return Ok(None);
         }
         match (self.stamp(), self.strictness, self.time) {
             (Some(stamp), ..) => Ok(Some(stamp)),
-            (None, Strictness::Refuse, Some(time)) => Err(self.file.no_number(time.index)),
-            (None, ..) => Ok(Some(Stamped::NONE)),
+            (None, RowStrictness::Refuse, Some(time)) => Err(self.file.no_number(time.index)),
+            (None, ..) => Ok(Some(RowTime::NONE)),
         }
     }
 
@@ -241,7 +241,14 @@ impl TextRows {
     /// Whether positions and torques have rows of their own at the beginning of the log, and fewer rows hold both.
     fn takes_turns(&self) -> bool {
         let path = &self.file.path;
-        let opened = || TextFile::open(path, Content::open(path)?, &self.asked, Strictness::Record);
+        let opened = || {
+            TextFile::open(
+                path,
+                FileContent::open(path)?,
+                &self.asked,
+                RowStrictness::Record,
+            )
+        };
         // what arrives on a stream cannot be read again
         let Some(mut file) = (!self.file.is_stream()).then(opened).and_then(Result::ok) else {
             return false;

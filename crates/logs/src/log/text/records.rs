@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use csv_core::ReadRecordResult;
 use memchr::{memchr_iter, memchr3};
 
-use crate::log::content::Bytes;
+use crate::log::content::ContentBytes;
 
 /// Bytes that one record may take.
 pub(super) const LONGEST_ROW: usize = 1 << 20;
@@ -15,12 +15,12 @@ const FIELDS: usize = 64;
 
 /// A record: its bytes, and where its fields lie in them.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Record {
+pub(super) struct TextRecord {
     bytes: Vec<u8>,
     fields: Vec<(usize, usize)>,
 }
 
-impl Record {
+impl TextRecord {
     #[inline]
     pub(super) fn len(&self) -> usize {
         self.fields.len()
@@ -47,8 +47,8 @@ impl Record {
 }
 
 /// A text as its records, comments and blank lines left out.
-pub(super) struct Records {
-    inner: Bytes,
+pub(super) struct TextRecords {
+    inner: ContentBytes,
     core: csv_core::Reader,
     delimiter: u8,
     comment: u8,
@@ -68,8 +68,8 @@ pub(super) struct Records {
     first: bool,
 }
 
-impl Records {
-    pub(super) fn new(inner: Bytes, delimiter: u8, comment: u8) -> Self {
+impl TextRecords {
+    pub(super) fn new(inner: ContentBytes, delimiter: u8, comment: u8) -> Self {
         let core = csv_core::ReaderBuilder::new()
             .delimiter(delimiter)
             .comment(Some(comment))
@@ -113,7 +113,7 @@ impl Records {
         self.last == b'\n'
     }
 
-    pub(super) fn read(&mut self, record: &mut Record) -> io::Result<bool> {
+    pub(super) fn read(&mut self, record: &mut TextRecord) -> io::Result<bool> {
         self.begins = self.line;
         if !self.first && self.read_line(record)? {
             return Ok(true);
@@ -124,7 +124,7 @@ impl Records {
 
     /// Takes the next line where it is one of plain fields.
     #[inline]
-    fn read_line(&mut self, record: &mut Record) -> io::Result<bool> {
+    fn read_line(&mut self, record: &mut TextRecord) -> io::Result<bool> {
         let mut looked = 0;
         loop {
             let rest = &self.buffer[self.at..self.filled];
@@ -154,7 +154,7 @@ impl Records {
     }
 
     /// Reads the next record by the rules of quotes.
-    fn read_quoted(&mut self, record: &mut Record) -> io::Result<bool> {
+    fn read_quoted(&mut self, record: &mut TextRecord) -> io::Result<bool> {
         let (mut size, mut count, mut taken) = (0, 0, 0);
         self.core.set_line(self.line);
         loop {
@@ -252,8 +252,8 @@ mod tests {
         let (head, rest) = text.as_bytes().split_at(text.len().min(4));
         let rest: Box<dyn Read + Send> = Box::new(Pieces(rest.to_vec(), 0, pieces));
         let inner = Cursor::new(head.to_vec()).chain(rest);
-        let mut records = Records::new(inner, b',', b'#');
-        let (mut record, mut out) = (Record::default(), Vec::new());
+        let mut records = TextRecords::new(inner, b',', b'#');
+        let (mut record, mut out) = (TextRecord::default(), Vec::new());
         while records.read(&mut record).unwrap() {
             let fields = (0..record.len()).map(|k| record.get(k).unwrap().to_vec());
             out.push((fields.collect(), records.byte(), records.begins()));
@@ -297,8 +297,9 @@ mod tests {
     #[test]
     fn a_record_without_an_end_is_an_error_before_it_fills_the_memory() {
         let endless: Box<dyn Read + Send> = Box::new(io::repeat(b'7'));
-        let mut records = Records::new(Cursor::new(b"t,q\n".to_vec()).chain(endless), b',', b'#');
-        let mut record = Record::default();
+        let mut records =
+            TextRecords::new(Cursor::new(b"t,q\n".to_vec()).chain(endless), b',', b'#');
+        let mut record = TextRecord::default();
         assert!(records.read(&mut record).unwrap());
         let error = records.read(&mut record).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);

@@ -1,15 +1,16 @@
 //! Where the table begins in a text: after a preamble, with a row of units, or right away.
 
-use super::line::{Line, Parting};
+use super::line::{FieldParting, Line};
 use super::number;
 use crate::log::columns;
-use crate::log::section::{Delimiter, LogSection};
+use crate::log::section::{ColumnDelimiter, LogSection};
 use crate::log::time::Instant;
 
-pub(super) struct Found {
+/// The line that names the columns of a text log, and what it says of them.
+pub(super) struct TextTable {
     /// Index of the line that names the columns.
     pub(super) at: usize,
-    pub(super) parting: Parting,
+    pub(super) parting: FieldParting,
     /// Whether the row after it holds no numbers.
     pub(super) second_row: bool,
     pub(super) units: Vec<String>,
@@ -39,7 +40,7 @@ pub(super) fn find(
     lines: &[Line<'_>],
     (first, comment): (usize, u8),
     wanted: &LogSection,
-) -> Found {
+) -> TextTable {
     let sign = char::from(comment);
     let is_row = |line: &Line<'_>| {
         let text = line.text.trim();
@@ -59,7 +60,7 @@ pub(super) fn find(
         && sign.is_ascii()
     {
         let runs = sign == b' ';
-        parting = Some(Parting { sign, runs });
+        parting = Some(FieldParting { sign, runs });
         from = 1;
     }
     let asked = wanted.header_line;
@@ -70,7 +71,7 @@ pub(super) fn find(
     let plain = |row: usize| {
         let line = rows.get(row).map_or("", |k| &lines[*k].text);
         Table {
-            parting: parting.unwrap_or_else(|| Parting::of(line, wanted.delimiter)),
+            parting: parting.unwrap_or_else(|| FieldParting::of(line, wanted.delimiter)),
             second: None,
         }
     };
@@ -118,14 +119,14 @@ pub(super) fn find(
         let below = &lines[rows[row + 1]];
         let (fields, line) = (found.parting.split(&below.text), below.number);
         notes.push(match second {
-            Second::Units => format!("units are those of line {line}"),
-            Second::Words => format!("line {line} holds words and is passed over"),
+            SecondRow::Units => format!("units are those of line {line}"),
+            SecondRow::Words => format!("line {line} holds words and is passed over"),
         });
-        if second == Second::Units {
+        if second == SecondRow::Units {
             units = fields.iter().map(|unit| (*unit).to_owned()).collect();
         }
     }
-    Found {
+    TextTable {
         at,
         parting: found.parting,
         second_row: second.is_some(),
@@ -141,14 +142,14 @@ fn width(fields: &[&str]) -> usize {
 
 /// What the row after the header holds, where it holds no numbers.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Second {
+enum SecondRow {
     Units,
     Words,
 }
 
 struct Table {
-    parting: Parting,
-    second: Option<Second>,
+    parting: FieldParting,
+    second: Option<SecondRow>,
 }
 
 impl Table {
@@ -156,11 +157,12 @@ impl Table {
     fn at(
         lines: &[Line<'_>],
         rows: &[usize],
-        parting: Option<Parting>,
-        asked: Delimiter,
+        parting: Option<FieldParting>,
+        asked: ColumnDelimiter,
     ) -> Option<Self> {
         let line = |row: usize| Some(&*lines[*rows.get(row)?].text);
-        let parting = parting.unwrap_or_else(|| Parting::of(line(0).unwrap_or_default(), asked));
+        let parting =
+            parting.unwrap_or_else(|| FieldParting::of(line(0).unwrap_or_default(), asked));
         let fields = |row: usize| Some(parting.split(line(row)?));
         let names = fields(0)?;
         let n = width(&names);
@@ -199,10 +201,10 @@ impl Table {
             all.len()
         };
         let second = match are_units(&below) {
-            true => Second::Units,
+            true => SecondRow::Units,
             // names that stand under those of groups are the names
             false if distinct(&below) > distinct(&names) => return None,
-            false => Second::Words,
+            false => SecondRow::Words,
         };
         let second = Some(second);
         Some(Self { parting, second })

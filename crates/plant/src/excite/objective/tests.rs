@@ -27,7 +27,7 @@ fn compare(
 ) -> f64 {
     let n = machine.coordinates();
     let free = (0..n).map(|i| (i == 2).then_some(1.7)).collect();
-    let variables = Variables::new(&machine.channels, TAU * 0.4, 5, free);
+    let variables = DesignVariables::new(&machine.channels, TAU * 0.4, 5, free);
     // motions fill twice the room that the objective allows, so that penalties press
     let tight: Vec<BoundedQuantity> = machine.channels.iter().map(|c| c.reserved(0.5)).collect();
     let objective = Objective::new(machine, criterion, &tight, variables, prior, 60);
@@ -36,7 +36,7 @@ fn compare(
     for number in 0..3 {
         let motion = random_motion(machine, &machine.channels, &objective.variables, 5, number);
         let z = objective.variables.of(&motion);
-        let mut multipliers = Multipliers::new(objective.constraints(), 3.0);
+        let mut multipliers = LagrangeMultipliers::new(objective.constraints(), 3.0);
         for (k, lambda) in multipliers.lambda.iter_mut().enumerate() {
             *lambda = 1e-3 * (k % 7) as f64;
         }

@@ -7,14 +7,14 @@
 //! but continuous contact that the error control steps through. Where it opens, at a reversal, c sgn(v) passes
 //! through zero of itself.
 
-use super::{Beginning, Built, Effect, PlantLaw, PlantState, sign};
+use super::{BuiltLaw, Effect, InitialCondition, PlantLaw, PlantState, sign};
 use cft_ident_core::effect::backlash::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.01 * site.half_travel(), 0.3 * site.scale],
     build: |site, _, values| {
-        Built::plant(Backlash {
+        BuiltLaw::plant(BacklashEffect {
             joint: site.joint(),
             half: 0.5 * values[0],
             c: values[1],
@@ -27,7 +27,8 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Share of half the gap within which contact comes about.
 const CONTACT: f64 = 0.005;
 
-struct Backlash {
+/// Play between the motor and the link of a joint.
+struct BacklashEffect {
     joint: usize,
     half: f64,
     c: f64,
@@ -36,7 +37,7 @@ struct Backlash {
     centre: Option<f64>,
 }
 
-impl Effect for Backlash {
+impl Effect for BacklashEffect {
     fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let Some(centre) = self.centre else {
             return;
@@ -51,7 +52,7 @@ impl Effect for Backlash {
         torque[self.joint] -= self.c * missing * sign(self.slope, v);
     }
 
-    fn begin(&mut self, beginning: &Beginning, _z: &mut [f64]) {
+    fn begin(&mut self, beginning: &InitialCondition, _z: &mut [f64]) {
         self.centre = beginning.q.get(self.joint).copied();
     }
 

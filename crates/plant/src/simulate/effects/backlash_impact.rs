@@ -5,7 +5,7 @@
 //! ([`TwoSides`]).
 
 use super::elasticity::{TwoSides, rotor};
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::backlash_impact::ENTRY;
 
@@ -24,7 +24,7 @@ pub static LAW: PlantLaw = PlantLaw {
             let rule = "must be below the joint's, and leave the motor less than the joint's least";
             return Err(SimulateError::number(ENTRY.name, "inertia", inertia, rule));
         }
-        Built::plant(sides)
+        BuiltLaw::plant(sides)
     },
 };
 

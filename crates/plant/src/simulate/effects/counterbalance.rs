@@ -5,7 +5,7 @@
 //! supplies d/dq of stiffness (l - free_length)^2/2. A moment that was found and not built is a cubic B-spline
 //! with the coefficients m_1..m_6 on three equal pieces between `from` and `to`, constant beyond them.
 
-use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
+use super::{BuiltLaw, Effect, EffectSite, PlantLaw, PlantRobot, PlantState};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::counterbalance::ENTRY;
 
@@ -28,7 +28,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &EffectSite, _: &PlantRobot, values: &[f64]) -> Result<BuiltLaw, SimulateError> {
     let refuse = |key, value, rule: &str| SimulateError::number(ENTRY.name, key, value, rule);
     let (stiffness, a, b) = (values[0], values[2], values[3]);
     if stiffness != 0.0 && !site.turns {
@@ -46,7 +46,7 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
     if to <= from {
         return Err(refuse("to - from", to - from, "must be above 0"));
     }
-    Built::plant(Counterbalance {
+    BuiltLaw::plant(CounterbalanceEffect {
         joint: site.joint(),
         stiffness,
         free_length: values[1],
@@ -59,7 +59,8 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
     })
 }
 
-struct Counterbalance {
+/// A spring that carries the weight of a link.
+struct CounterbalanceEffect {
     joint: usize,
     stiffness: f64,
     free_length: f64,
@@ -72,7 +73,7 @@ struct Counterbalance {
     coefficients: [f64; COUNT],
 }
 
-impl Counterbalance {
+impl CounterbalanceEffect {
     /// The lever's moment at the position q.
     fn lever(&self, q: f64) -> f64 {
         let (s, c) = (q - self.angle).sin_cos();
@@ -97,7 +98,7 @@ impl Counterbalance {
     }
 }
 
-impl Effect for Counterbalance {
+impl Effect for CounterbalanceEffect {
     fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let q = motion.q[self.joint];
         if self.stiffness != 0.0 {

@@ -4,7 +4,7 @@
 //! `from` is the number of joint j, counted from one. The torque acts on joint i alone: M is then no longer
 //! symmetric, and the plant solves it by elimination.
 
-use super::{Built, Effect, PlantLaw, PlantState, sign};
+use super::{BuiltLaw, Effect, PlantLaw, PlantState, sign};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::coupling::ENTRY;
 
@@ -29,7 +29,7 @@ pub static LAW: PlantLaw = PlantLaw {
         };
         let ratio = values[5];
         let way = if ratio < 0.0 { -1.0 } else { 1.0 };
-        Built::plant(Coupling {
+        BuiltLaw::plant(CouplingEffect {
             joint: site.joint(),
             from,
             viscous: way * values[1],
@@ -42,7 +42,8 @@ pub static LAW: PlantLaw = PlantLaw {
     },
 };
 
-struct Coupling {
+/// Friction and inertia that a joint has by the motion of another one.
+struct CouplingEffect {
     joint: usize,
     from: usize,
     viscous: f64,
@@ -54,7 +55,7 @@ struct Coupling {
     slope: f64,
 }
 
-impl Effect for Coupling {
+impl Effect for CouplingEffect {
     fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let other = motion.v[self.from];
         let together = motion.v[self.joint] + self.ratio * other;

@@ -4,7 +4,7 @@
 //! t_k - d and the same time of the next row: a share of a step is a share of two rows. The plant knows
 //! nothing of it; the noise of the torque comes after it.
 
-use super::{Built, LoggedChannels, PlantLaw};
+use super::{BuiltLaw, LoggedChannels, PlantLaw};
 use cft_ident_core::effect::delay::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -12,7 +12,7 @@ pub static LAW: PlantLaw = PlantLaw {
     defaults: |_| vec![0.005],
     build: |site, _, values| {
         let (joint, d) = (site.joint(), values[0]);
-        Built::log(true, move |log| delay(log, joint, d))
+        BuiltLaw::log(true, move |log| delay(log, joint, d))
     },
 };
 

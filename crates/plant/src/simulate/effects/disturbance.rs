@@ -3,7 +3,7 @@
 //! The torque jumps in time: the step across an edge is refused by the error control until it is so short
 //! that the edge does not show.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::disturbance::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -11,6 +11,6 @@ pub static LAW: PlantLaw = PlantLaw {
     defaults: |site| vec![5.0, 0.5, 0.5 * site.scale],
     build: |site, _, values| {
         let (pushed, c) = (values[0]..values[0] + values[1], values[2]);
-        Built::torque(site, move |m| if pushed.contains(&m.t) { c } else { 0.0 })
+        BuiltLaw::torque(site, move |m| if pushed.contains(&m.t) { c } else { 0.0 })
     },
 };

@@ -6,15 +6,15 @@
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::{Beginning, Built, Effect, PlantLaw, PlantState};
-use crate::simulate::chance::{Purpose, stream_of};
+use super::{BuiltLaw, Effect, InitialCondition, PlantLaw, PlantState};
+use crate::simulate::chance::{ChancePurpose, stream_of};
 use cft_ident_core::effect::drift::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.01 * site.scale, 0.0],
     build: |site, _, values| {
-        Built::plant(Drift {
+        BuiltLaw::plant(DriftEffect {
             joint: site.joint(),
             c: values[0],
             walk: values[1],
@@ -26,7 +26,7 @@ pub static LAW: PlantLaw = PlantLaw {
 /// Time between two knots of the walk \[s\].
 const KNOT: f64 = 0.01;
 
-struct Drift {
+struct DriftEffect {
     joint: usize,
     c: f64,
     walk: f64,
@@ -34,7 +34,7 @@ struct Drift {
     knots: Vec<f64>,
 }
 
-impl Effect for Drift {
+impl Effect for DriftEffect {
     fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let at = (motion.t / KNOT).max(0.0);
         let (before, share) = (at.floor(), at.fract());
@@ -44,11 +44,11 @@ impl Effect for Drift {
         torque[self.joint] += self.c * motion.t + left + share * (right - left);
     }
 
-    fn begin(&mut self, beginning: &Beginning, _z: &mut [f64]) {
+    fn begin(&mut self, beginning: &InitialCondition, _z: &mut [f64]) {
         if self.walk == 0.0 {
             return;
         }
-        let mut chance = stream_of(beginning.seed, Purpose::Drift, self.joint);
+        let mut chance = stream_of(beginning.seed, ChancePurpose::Drift, self.joint);
         let count = (beginning.seconds / KNOT).ceil() as usize + 2;
         let step = self.walk * KNOT.sqrt();
         let mut value = 0.0;

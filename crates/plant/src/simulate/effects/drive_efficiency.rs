@@ -3,14 +3,14 @@
 //! E = k tau_l H(tau_l v) with tau_l = M a + C v + G, solved with the balance as in `load-friction`; the step
 //! is as steep in v as the joint allows and exact in tau_l, where the torque is continuous.
 
-use super::{Built, Effect, PlantLaw, PlantState, step};
+use super::{BuiltLaw, Effect, PlantLaw, PlantState, step};
 use cft_ident_core::effect::drive_efficiency::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |_| vec![0.1],
     build: |site, _, values| {
-        Built::plant(DriveEfficiency {
+        BuiltLaw::plant(DriveEfficiency {
             joint: site.joint(),
             k: values[0],
             slope: site.slope(),

@@ -7,7 +7,7 @@
 //! T = stiffness z + d dz/dt, d = 2 damping sqrt(stiffness inertia), and B (a + d2z/dt2) = tau - F - E - T on the
 //! motor's side. Both sides are integrated.
 
-use super::{Beginning, Built, Effect, PlantLaw, PlantState, Site, Twist};
+use super::{BuiltLaw, Effect, EffectSite, InitialCondition, JointTwist, PlantLaw, PlantState};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::elasticity::ENTRY;
 
@@ -27,7 +27,7 @@ pub static LAW: PlantLaw = PlantLaw {
             let rule = "must be below the joint's, and leave the motor less than the joint's least";
             return Err(SimulateError::number(ENTRY.name, "inertia", inertia, rule));
         }
-        Built::plant(sides)
+        BuiltLaw::plant(sides)
     },
 };
 
@@ -41,7 +41,7 @@ const ROTOR_AT_MOST: f64 = 0.3;
 const DAMPING: f64 = 0.025;
 
 /// Default inertia on the motor's side, kg or kg m^2.
-pub(super) fn rotor(site: &Site) -> f64 {
+pub(super) fn rotor(site: &EffectSite) -> f64 {
     (ROTOR * site.inertia).min(ROTOR_AT_MOST * site.least_inertia)
 }
 
@@ -56,7 +56,7 @@ pub(super) struct TwoSides {
 
 impl TwoSides {
     /// Without a gap; `damping` is the ratio of the link on its spring.
-    pub(super) fn of(site: &Site, stiffness: f64, inertia: f64, damping: f64) -> Self {
+    pub(super) fn of(site: &EffectSite, stiffness: f64, inertia: f64, damping: f64) -> Self {
         Self {
             joint: site.joint(),
             stiffness,
@@ -67,7 +67,7 @@ impl TwoSides {
     }
 
     /// Whether both sides have an inertia in every pose.
-    pub(super) fn can_be(&self, site: &Site, inertia: f64) -> bool {
+    pub(super) fn can_be(&self, site: &EffectSite, inertia: f64) -> bool {
         self.rotor > 0.0 && inertia > 0.0 && self.rotor < site.least_inertia
     }
 
@@ -95,11 +95,11 @@ impl Effect for TwoSides {
         mass[self.joint * (motion.q.len() + 1)] -= self.rotor;
     }
 
-    fn twist(&self, z: &[f64]) -> Option<Twist> {
+    fn twist(&self, z: &[f64]) -> Option<JointTwist> {
         let &[deflection, rate] = z else {
             return None;
         };
-        Some(Twist {
+        Some(JointTwist {
             joint: self.joint,
             deflection,
             rate,
@@ -116,7 +116,7 @@ impl Effect for TwoSides {
         *acceleration = (motion.net[self.joint] - passed) / self.rotor - motion.a[self.joint];
     }
 
-    fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
+    fn begin(&mut self, beginning: &InitialCondition, z: &mut [f64]) {
         if let ([deflection, _], Some(load)) = (z, beginning.load.get(self.joint)) {
             let side = if *load < 0.0 { -0.5 } else { 0.5 };
             *deflection = load / self.stiffness + side * self.gap;

@@ -8,7 +8,9 @@
 use cft_ident_core::explain::ErrorText;
 use nalgebra::{SMatrix, SVector};
 
-use super::{Beginning, Built, Effect, PlantLaw, PlantRobot, PlantState, Site, sign};
+use super::{
+    BuiltLaw, Effect, EffectSite, InitialCondition, PlantLaw, PlantRobot, PlantState, sign,
+};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::empirical::ENTRY;
 
@@ -26,7 +28,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &EffectSite, _: &PlantRobot, values: &[f64]) -> Result<BuiltLaw, SimulateError> {
     let (signal, from, to) = (values[0].round() as u32, values[1], values[2]);
     if to <= from {
         let (key, rule) = ("to - from", "must be above 0");
@@ -40,7 +42,7 @@ fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateE
         ));
     }
     let knots: [f64; KNOTS] = std::array::from_fn(|i| values[3 + i]);
-    Built::plant(Curve {
+    BuiltLaw::plant(Curve {
         joint: site.joint(),
         signal,
         from,
@@ -109,7 +111,7 @@ impl Effect for Curve {
         };
     }
 
-    fn begin(&mut self, beginning: &Beginning, _z: &mut [f64]) {
+    fn begin(&mut self, beginning: &InitialCondition, _z: &mut [f64]) {
         self.turning = [beginning.q.get(self.joint).copied().unwrap_or(0.0); 2];
     }
 

@@ -3,7 +3,7 @@
 //! dy/dt = 2 pi cutoff (x - y) with the input straight from row to row and the output settled at the first
 //! row, solved exactly.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::filter::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -12,7 +12,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build: |site, _, values| {
         let (joint, torque) = (site.joint(), values[1] != 0.0);
         let rate = std::f64::consts::TAU * values[0];
-        Built::log(false, move |log| {
+        BuiltLaw::log(false, move |log| {
             let mut before: Option<(f64, f64, f64)> = None;
             for (t, value) in log.channel(joint, torque) {
                 let x = *value;

@@ -3,10 +3,12 @@
 //! Accelerations and loads hang on the torque that they decide; what is in them is solved for
 //! ([`super::Effect::implicit`]).
 
-use super::{Effect, EffectSpec, EffectValue, LAWS, PlantParameter, PlantState, Site, Sites, sign};
+use super::{
+    Effect, EffectSite, EffectSpec, EffectValue, LAWS, PlantParameter, PlantState, RobotSites, sign,
+};
 use crate::simulate::SimulateError;
 use crate::simulate::temperature::PlantTemperatures;
-use cft_ident_core::effect::Places;
+use cft_ident_core::effect::PlaceRule;
 use cft_ident_core::math::formula::{Formula, MOST_NAMES};
 use cft_ident_core::robot::FormulaSignal;
 use cft_ident_files::config::candidates::CandidateSection;
@@ -26,7 +28,7 @@ enum Input {
 }
 
 /// The formulas of one candidate at one joint.
-struct Own {
+struct CandidateFormulas {
     joint: usize,
     terms: Vec<Term>,
     /// Of every joint: Coulomb level, viscous coefficient and a steep slope.
@@ -43,7 +45,7 @@ type OfPlant = (Box<dyn Effect>, EffectValue);
 pub(super) fn build(
     spec: &EffectSpec,
     candidate: &CandidateSection,
-    sites: &Sites,
+    sites: &RobotSites,
 ) -> Result<Vec<OfPlant>, SimulateError> {
     if LAWS.iter().any(|law| law.entry.name == candidate.name) {
         return Err(wrong(candidate, "an effect that is known has its name"));
@@ -51,7 +53,7 @@ pub(super) fn build(
     let keys = candidate.shapes.keys().chain(candidate.formulas.keys());
     spec.check_keys(keys.map(String::as_str).collect())?;
     let mut out = Vec::new();
-    for site in spec.sites(Places::Joints, sites)? {
+    for site in spec.sites(PlaceRule::Joints, sites)? {
         let may = |joints: &Vec<String>| joints.contains(&site.name);
         if !candidate.joints.as_ref().is_none_or(may) {
             match &spec.joint {
@@ -59,7 +61,7 @@ pub(super) fn build(
                 None => continue,
             }
         }
-        let own = Own::of(spec, candidate, site, sites)?;
+        let own = CandidateFormulas::of(spec, candidate, site, sites)?;
         let value = value(spec, candidate, site)?;
         out.push((Box::new(own) as Box<dyn Effect>, value));
     }
@@ -88,7 +90,7 @@ fn number(spec: &EffectSpec, key: &str) -> Result<f64, SimulateError> {
 fn value(
     spec: &EffectSpec,
     candidate: &CandidateSection,
-    site: &Site,
+    site: &EffectSite,
 ) -> Result<EffectValue, SimulateError> {
     let shapes = candidate.shapes.iter();
     let shapes = shapes.map(|(key, range)| (key, range.unit.clone()));
@@ -106,12 +108,12 @@ fn value(
     })
 }
 
-impl Own {
+impl CandidateFormulas {
     fn of(
         spec: &EffectSpec,
         candidate: &CandidateSection,
-        site: &Site,
-        sites: &Sites,
+        site: &EffectSite,
+        sites: &RobotSites,
     ) -> Result<Self, SimulateError> {
         for (name, range) in &candidate.shapes {
             let value = number(spec, name)?;
@@ -164,7 +166,7 @@ impl Own {
         let terms: Vec<Term> = terms.collect::<Result<_, SimulateError>>()?;
         use FormulaSignal::{Acceleration, Load};
         let implicit = |input: &Input| matches!(input, Input::Signal(Acceleration | Load, _));
-        let of = |site: &Site| [site.coulomb, site.viscous, site.slope()];
+        let of = |site: &EffectSite| [site.coulomb, site.viscous, site.slope()];
         Ok(Self {
             joint: site.joint(),
             implicit: terms.iter().any(|term| term.inputs.iter().any(implicit)),
@@ -208,7 +210,7 @@ impl Own {
     }
 }
 
-impl Effect for Own {
+impl Effect for CandidateFormulas {
     fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         if !self.implicit {
             self.add(motion, torque);

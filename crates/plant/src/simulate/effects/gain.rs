@@ -1,13 +1,13 @@
 //! `gain`: a wrong torque constant or gear, so that the logged torque is (1 + k) times the acting one.
 
-use super::{Built, Effect, PlantLaw, PlantState};
+use super::{BuiltLaw, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::gain::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |_| vec![0.1],
     build: |site, _, values| {
-        Built::plant(Gain {
+        BuiltLaw::plant(Gain {
             joint: site.joint(),
             acting: 1.0 / (1.0 + values[0]),
         })

@@ -4,14 +4,14 @@
 //! The torque that acts is the logged one over 1 + k (1 - exp(-x/scale)). Where x is the size of the acting torque
 //! itself, that is found by Newton's method.
 
-use super::{Built, Effect, PlantLaw, PlantState};
+use super::{BuiltLaw, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::gain_change::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |_| vec![1.0, 20.0, 0.1],
     build: |site, _, values| {
-        Built::plant(GainChange {
+        BuiltLaw::plant(GainChange {
             joint: site.joint(),
             by_time: values[0] < 1.5,
             scale: values[1],

@@ -10,10 +10,10 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
-use super::{Built, PlantLaw, PlantRobot, Site};
+use super::{BuiltLaw, EffectSite, PlantLaw, PlantRobot};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::gravity_tilt::ENTRY;
-use cft_ident_core::robot::cft::dynamics::Coefficients;
+use cft_ident_core::robot::cft::dynamics::ReportCoefficients;
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_core::robot::tree::Tree;
 use cft_ident_core::robot::{JointKind, Robot};
@@ -24,7 +24,11 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(
+    site: &EffectSite,
+    machine: &PlantRobot,
+    values: &[f64],
+) -> Result<BuiltLaw, SimulateError> {
     let [gx, gy] = [values[0], values[1]];
     let PlantRobot { robot, theta } = *machine;
     if let Some(chain) = robot.coefficients(theta) {
@@ -38,7 +42,7 @@ fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Sim
         // The base's x lies along the axis; y is across it and does no work.
         JointKind::Prismatic => {
             let force = -theta[0] * gx;
-            Built::inertia(move |_, _, torque| torque[0] += force)
+            BuiltLaw::inertia(move |_, _, torque| torque[0] += force)
         }
         JointKind::Revolute => Err(site.refuse(
             ENTRY.name,
@@ -48,8 +52,8 @@ fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Sim
     }
 }
 
-fn of_cft(chain: Coefficients, gx: f64, gy: f64) -> Result<Built, SimulateError> {
-    Built::inertia(move |motion, _, torque| {
+fn of_cft(chain: ReportCoefficients, gx: f64, gy: f64) -> Result<BuiltLaw, SimulateError> {
+    BuiltLaw::inertia(move |motion, _, torque| {
         let (Some(&[_, q2, q4, q5]), [tau1, tau2, tau4, tau5]) = (motion.q.first_chunk(), torque)
         else {
             return;
@@ -94,8 +98,8 @@ fn of_links(
     chain: Tree,
     moments: Vec<(f64, Vector3<f64>)>,
     gravity: Vector3<f64>,
-) -> Result<Built, SimulateError> {
-    Built::inertia(move |motion, _, torque| {
+) -> Result<BuiltLaw, SimulateError> {
+    BuiltLaw::inertia(move |motion, _, torque| {
         frames(&chain, motion.q, motion.v, |link, frame: &Frame| {
             let (mass, moment) = moments[link];
             let arm = frame.rotation * moment;

@@ -4,7 +4,7 @@
 //! As the friction is piecewise linear in tau_l, the plant solves tau_l (1 + s) = what is left of the motor's
 //! torque in closed form, without iteration ([`super::Effect::load`]).
 
-use super::{Built, Effect, PlantLaw, PlantState};
+use super::{BuiltLaw, Effect, PlantLaw, PlantState};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::load_friction::ENTRY;
 
@@ -21,7 +21,7 @@ pub static LAW: PlantLaw = PlantLaw {
             let rule = format!("must stay below {MAX_LOAD_SHARE}: {beyond}");
             return Err(SimulateError::number(ENTRY.name, key, most, rule));
         }
-        Built::plant(LoadFriction {
+        BuiltLaw::plant(LoadFriction {
             joint: site.joint(),
             mu_c: values[0],
             mu_v: values[1],

@@ -2,13 +2,13 @@
 //!
 //! An effect is named on the command line as `NAME[:JOINT][:key=value,...]`; without a joint it acts on
 //! every joint, and a key that is left out takes a default that scales with the joint (docs/developers/effects.md).
-//! Most effects are torques or states of the plant ([`Effect`], [`Built`]); delays and faults of the data are put
+//! Most effects are torques or states of the plant ([`Effect`], [`BuiltLaw`]); delays and faults of the data are put
 //! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`LAWS`]. Effects of a
 //! user's own come with their formulas ([`EffectSpec::own`]).
 //!
 //! A jump in speed would leave the differential equation without a solution at rest. Signs and steps of
 //! the speed are therefore tanh(w v) and (1 + tanh(w v))/2, with w as steep as the joint's inertia lets an
-//! explicit integrator follow ([`Site::slope`]).
+//! explicit integrator follow ([`EffectSite::slope`]).
 
 mod fault;
 mod formula;
@@ -18,8 +18,8 @@ mod site;
 mod spec;
 
 pub use fault::{Fault, LoggedChannels};
-pub use plant_law::{Built, PlantLaw};
-pub use site::{PlantRobot, Site, Sites};
+pub use plant_law::{BuiltLaw, PlantLaw};
+pub use site::{EffectSite, PlantRobot, RobotSites};
 pub use spec::{EffectSpec, EffectValue, PlantParameter};
 
 use std::ops::Range;
@@ -50,7 +50,7 @@ pub struct PlantState<'a> {
 
 /// What an effect learns before the first step.
 #[derive(Debug, Clone, Copy)]
-pub struct Beginning<'a> {
+pub struct InitialCondition<'a> {
     /// Joint positions, m or rad.
     pub q: &'a [f64],
     /// Rigid-body torque of the joints at the start, N or N m.
@@ -62,7 +62,7 @@ pub struct Beginning<'a> {
 
 /// A joint whose motor and link are joined by a spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Twist {
+pub struct JointTwist {
     pub joint: usize,
     /// Position of the motor beyond the link, m or rad, and its rate.
     pub deflection: f64,
@@ -103,12 +103,12 @@ pub trait Effect: Send {
     fn drive(&self, _motion: &PlantState, _logged: &[f64], _acting: &mut [f64]) {}
 
     /// The spring that the effect puts between a motor and its link.
-    fn twist(&self, _z: &[f64]) -> Option<Twist> {
+    fn twist(&self, _z: &[f64]) -> Option<JointTwist> {
         None
     }
 
     /// Readies memory and states before the first step.
-    fn begin(&mut self, _beginning: &Beginning, _z: &mut [f64]) {}
+    fn begin(&mut self, _beginning: &InitialCondition, _z: &mut [f64]) {}
 
     /// Takes an accepted step into its memory; `true` when that changes its torque at this point.
     fn moved(&mut self, _motion: &PlantState) -> bool {
@@ -169,19 +169,19 @@ catalogue! {
 
 /// The effects of one plant, each with its slice of the extra states, and the faults of its log.
 #[derive(Default)]
-pub struct Effects {
+pub struct PlantEffects {
     list: Vec<(Box<dyn Effect>, Range<usize>)>,
     /// By name.
     faults: Vec<(&'static str, Fault)>,
 }
 
-impl std::fmt::Debug for Effects {
+impl std::fmt::Debug for PlantEffects {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         write!(f, "{} effects", self.list.len() + self.faults.len())
     }
 }
 
-impl Effects {
+impl PlantEffects {
     /// Builds the effects; the second result is what they came out as, one entry per joint.
     ///
     /// # Errors
@@ -189,7 +189,7 @@ impl Effects {
     /// [`SimulateError::EffectPlace`], [`SimulateError::EffectNumber`].
     pub fn build(
         specs: &[EffectSpec],
-        sites: &Sites,
+        sites: &RobotSites,
     ) -> Result<(Self, Vec<EffectValue>), SimulateError> {
         let mut effects = Self::default();
         let mut values = Vec::new();
@@ -205,8 +205,8 @@ impl Effects {
             for site in spec.sites(law.entry.places, sites)? {
                 let numbers = spec.numbers(law, site)?;
                 match law.built(site, &sites.machine, &numbers)? {
-                    Built::Plant(effect) => effects.push(effect),
-                    Built::Log(fault) => effects.faults.push((law.entry.name, fault)),
+                    BuiltLaw::Plant(effect) => effects.push(effect),
+                    BuiltLaw::Log(fault) => effects.faults.push((law.entry.name, fault)),
                 }
                 values.push(EffectValue::new(law.entry, site, &sites.machine, &numbers));
             }
@@ -255,7 +255,7 @@ impl Effects {
     }
 
     /// The springs between motors and links, for the states z of all effects.
-    pub(super) fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = Twist> + 'a {
+    pub(super) fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = JointTwist> + 'a {
         let each = self.list.iter();
         each.filter_map(|(effect, states)| effect.twist(&z[states.clone()]))
     }
@@ -268,7 +268,7 @@ impl Effects {
     }
 
     /// Readies every effect before the first step.
-    pub(super) fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
+    pub(super) fn begin(&mut self, beginning: &InitialCondition, z: &mut [f64]) {
         for (effect, states) in &mut self.list {
             effect.begin(beginning, &mut z[states.clone()]);
         }

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
 use super::rotor_inertia::at_joint;
-use super::{Built, PlantLaw, PlantRobot, Site};
+use super::{BuiltLaw, EffectSite, PlantLaw, PlantRobot};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::payload::ENTRY;
 use cft_ident_core::robot::JointKind;
@@ -23,7 +23,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(_: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(_: &EffectSite, machine: &PlantRobot, values: &[f64]) -> Result<BuiltLaw, SimulateError> {
     let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
     let robot = machine.robot;
     if !robot.knows_links() {
@@ -45,8 +45,12 @@ fn build(_: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, Simula
 }
 
 /// At a place in the frame of link 8 \[m\], whose height does not matter, for the tool stays level.
-fn carried(carried: f64, [outward, side]: [f64; 2], inertia: f64) -> Result<Built, SimulateError> {
-    Built::inertia(move |motion, mass, torque| {
+fn carried(
+    carried: f64,
+    [outward, side]: [f64; 2],
+    inertia: f64,
+) -> Result<BuiltLaw, SimulateError> {
+    BuiltLaw::inertia(move |motion, mass, torque| {
         let (Some(&[_, q2, q4, q5]), Some(&[v1, v2, v4, v5])) =
             (motion.q.first_chunk(), motion.v.first_chunk())
         else {
@@ -92,8 +96,8 @@ fn on_last_link(
     carried: f64,
     centre: Vector3<f64>,
     inertia: f64,
-) -> Result<Built, SimulateError> {
-    Built::inertia(move |motion, mass, torque| {
+) -> Result<BuiltLaw, SimulateError> {
+    BuiltLaw::inertia(move |motion, mass, torque| {
         let n = chain.joints();
         let last = chain.links().len() - 1;
         let gravity = Vector3::from(chain.gravity());

@@ -1,6 +1,6 @@
 //! How the plant has an effect: default values of the entry's keys, and how it is built from one value each.
 
-use super::{Effect, Fault, LoggedChannels, PlantRobot, PlantState, Site};
+use super::{Effect, EffectSite, Fault, LoggedChannels, PlantRobot, PlantState};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::Entry;
 
@@ -8,12 +8,12 @@ use cft_ident_core::effect::Entry;
 pub struct PlantLaw {
     pub entry: &'static Entry,
     /// Of every key of the entry, in its order, at a site.
-    pub defaults: fn(&Site) -> Vec<f64>,
-    pub build: fn(&Site, &PlantRobot, &[f64]) -> Result<Built, SimulateError>,
+    pub defaults: fn(&EffectSite) -> Vec<f64>,
+    pub build: fn(&EffectSite, &PlantRobot, &[f64]) -> Result<BuiltLaw, SimulateError>,
 }
 
 /// What a law is built into.
-pub enum Built {
+pub enum BuiltLaw {
     /// A part of the plant.
     Plant(Box<dyn Effect>),
     /// A fault of the log.
@@ -47,7 +47,7 @@ impl<F: Fn(&PlantState, &mut [f64], &mut [f64]) + Send> Effect for Inertia<F> {
     }
 }
 
-impl Built {
+impl BuiltLaw {
     /// An effect of the plant.
     pub(super) fn plant(effect: impl Effect + 'static) -> Result<Self, SimulateError> {
         Ok(Self::Plant(Box::new(effect)))
@@ -55,7 +55,7 @@ impl Built {
 
     /// A torque at the site's joint.
     pub(super) fn torque(
-        site: &Site,
+        site: &EffectSite,
         torque: impl Fn(JointState) -> f64 + Send + 'static,
     ) -> Result<Self, SimulateError> {
         let j = site.joint();
@@ -100,10 +100,10 @@ impl PlantLaw {
     /// Builds the effect from one number per key.
     pub(super) fn built(
         &self,
-        site: &Site,
+        site: &EffectSite,
         machine: &PlantRobot,
         numbers: &[f64],
-    ) -> Result<Built, SimulateError> {
+    ) -> Result<BuiltLaw, SimulateError> {
         let built = (self.build)(site, machine, numbers)?;
         for (key, value) in self.entry.keys.iter().zip(numbers) {
             if let Some(range) = key.range.filter(|range| !range.holds(*value)) {

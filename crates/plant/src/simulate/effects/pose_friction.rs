@@ -2,7 +2,7 @@
 //!
 //! E = sgn(v_i) (sin sin(k q_j) + cos cos(k q_j)), k as in `ripple` of joint j, the sign as steep as the joint allows.
 
-use super::{Built, PlantLaw, sign};
+use super::{BuiltLaw, PlantLaw, sign};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::pose_friction::ENTRY;
 use cft_ident_core::robot::JointKind;
@@ -31,7 +31,7 @@ pub static LAW: PlantLaw = PlantLaw {
             JointKind::Prismatic => std::f64::consts::TAU * values[1],
         };
         let (sin, cos, slope) = (values[2], values[3], site.slope());
-        Built::torques(move |motion, torque| {
+        BuiltLaw::torques(move |motion, torque| {
             let (s, c) = (wavenumber * motion.q[other]).sin_cos();
             torque[joint] += sign(slope, motion.v[joint]) * (sin * s + cos * c);
         })

@@ -2,7 +2,7 @@
 //!
 //! E = sgn(v) (sin sin(k q) + cos cos(k q)), k as in `ripple`, the sign as steep as the joint allows.
 
-use super::{Built, PlantLaw, ripple, sign};
+use super::{BuiltLaw, PlantLaw, ripple, sign};
 use cft_ident_core::effect::position_friction::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -14,7 +14,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build: |site, _, values| {
         let (wavenumber, slope) = (ripple::wavenumber(site, values[0]), site.slope());
         let (sin, cos) = (values[1], values[2]);
-        Built::torque(site, move |m| {
+        BuiltLaw::torque(site, move |m| {
             let (s, c) = (wavenumber * m.q).sin_cos();
             sign(slope, m.v) * (sin * s + cos * c)
         })

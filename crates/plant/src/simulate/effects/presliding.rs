@@ -4,7 +4,7 @@
 //! constant level), where the level Fc is `fc`, by default that of the joint's law at speed. The law's own Coulomb part
 //! F(v) - viscous v is taken out. The state is integrated with the plant; |v| has a kink and no jump.
 
-use super::{Built, Effect, PlantLaw, PlantState};
+use super::{BuiltLaw, Effect, PlantLaw, PlantState};
 use cft_ident_core::effect::presliding::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -22,7 +22,7 @@ pub static LAW: PlantLaw = PlantLaw {
                  level fc above 0",
             ));
         }
-        Built::plant(Presliding {
+        BuiltLaw::plant(PreslidingEffect {
             joint: site.joint(),
             sigma0: values[0],
             sigma1: values[1],
@@ -37,7 +37,8 @@ const fn bend(turns: bool) -> f64 {
     if turns { 1e-3 } else { 1e-4 }
 }
 
-struct Presliding {
+/// A bristle between the surfaces of a joint, which bends before they slide.
+struct PreslidingEffect {
     joint: usize,
     sigma0: f64,
     sigma1: f64,
@@ -46,7 +47,7 @@ struct Presliding {
     viscous: f64,
 }
 
-impl Presliding {
+impl PreslidingEffect {
     fn bending(&self, motion: &PlantState) -> f64 {
         let v = motion.v[self.joint];
         let z = motion.z.first().copied().unwrap_or(0.0);
@@ -54,7 +55,7 @@ impl Presliding {
     }
 }
 
-impl Effect for Presliding {
+impl Effect for PreslidingEffect {
     fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let z = motion.z.first().copied().unwrap_or(0.0);
         let bristles = self.sigma0 * z + self.sigma1 * self.bending(motion);

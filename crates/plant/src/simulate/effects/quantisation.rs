@@ -1,6 +1,6 @@
 //! `quantisation`: the logged torque of a joint is rounded to whole steps.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::quantisation::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -8,7 +8,7 @@ pub static LAW: PlantLaw = PlantLaw {
     defaults: |site| vec![0.1 * site.scale],
     build: |site, _, values| {
         let (joint, step) = (site.joint(), values[0]);
-        Built::log(false, move |log| {
+        BuiltLaw::log(false, move |log| {
             for torque in log.torques(joint) {
                 *torque = (*torque / step).round() * step;
             }

@@ -2,9 +2,9 @@
 //!
 //! M, C and G are linear in the parameters, so the ten alone make the inertia and the torque that are added.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::rigid_body_terms::ENTRY;
-use cft_ident_core::robot::cft::dynamics::{Coefficients, inertia_and_bias};
+use cft_ident_core::robot::cft::dynamics::{ReportCoefficients, inertia_and_bias};
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
@@ -25,8 +25,8 @@ pub static LAW: PlantLaw = PlantLaw {
         for (own, value) in theta[12..].iter_mut().zip(values) {
             *own = *value;
         }
-        let terms = Coefficients::from_theta22(&theta);
-        Built::inertia(move |motion, mass, torque| {
+        let terms = ReportCoefficients::from_theta22(&theta);
+        BuiltLaw::inertia(move |motion, mass, torque| {
             let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
                 return;
             };

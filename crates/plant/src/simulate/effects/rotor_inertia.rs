@@ -3,9 +3,9 @@
 //! At x_r or y_r, J is a mass in kg on the screw's nut and the joints feel J_a^T J (J_a a + dJ_a/dt v) with the
 //! Jacobian J_a of the pantograph; at a joint they feel J a.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use crate::simulate::SimulateError;
-use cft_ident_core::effect::Place;
+use cft_ident_core::effect::EffectPlace;
 use cft_ident_core::effect::rotor_inertia::ENTRY;
 use cft_ident_core::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
 
@@ -13,18 +13,18 @@ pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |site| vec![0.25 * site.inertia],
     build: |site, _, values| match site.place {
-        Place::Actuator(row) => at_screw(row, values[0]),
+        EffectPlace::Actuator(row) => at_screw(row, values[0]),
         _ => at_joint(site.joint(), values[0]),
     },
 };
 
 /// Inertia of one joint, kg or kg m^2.
-pub(super) fn at_joint(joint: usize, inertia: f64) -> Result<Built, SimulateError> {
-    Built::inertia(move |motion, mass, _| mass[joint * (motion.q.len() + 1)] += inertia)
+pub(super) fn at_joint(joint: usize, inertia: f64) -> Result<BuiltLaw, SimulateError> {
+    BuiltLaw::inertia(move |motion, mass, _| mass[joint * (motion.q.len() + 1)] += inertia)
 }
 
-fn at_screw(row: usize, moving: f64) -> Result<Built, SimulateError> {
-    Built::inertia(move |motion, mass, torque| {
+fn at_screw(row: usize, moving: f64) -> Result<BuiltLaw, SimulateError> {
+    BuiltLaw::inertia(move |motion, mass, torque| {
         let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
             return;
         };

@@ -1,6 +1,6 @@
 //! `saturation`: the logged torque of a joint stops at a limit.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::saturation::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -8,7 +8,7 @@ pub static LAW: PlantLaw = PlantLaw {
     defaults: |site| vec![site.scale],
     build: |site, _, values| {
         let (joint, limit) = (site.joint(), values[0]);
-        Built::log(false, move |log| {
+        BuiltLaw::log(false, move |log| {
             for torque in log.torques(joint) {
                 *torque = torque.clamp(-limit, limit);
             }

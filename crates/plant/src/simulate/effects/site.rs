@@ -4,7 +4,7 @@
 use crate::simulate::SimulateError;
 use crate::simulate::plant::Plant;
 use crate::simulate::temperature::PlantTemperatures;
-use cft_ident_core::effect::Place;
+use cft_ident_core::effect::EffectPlace;
 use cft_ident_core::explain::ErrorText;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::cft::geometry::L4;
@@ -15,13 +15,13 @@ const SLIDING_SPEED: f64 = 0.2;
 const TURNING_SPEED: f64 = 0.5;
 /// Middling speed of the screws' nuts \[m/s\].
 const SCREW_SPEED: f64 = 0.05;
-/// Rate at which a torque of [`Site::scale`] against the speed brings the joint to rest \[1/s\]: steps of 0.3 ms stay stable.
+/// Rate at which a torque of [`EffectSite::scale`] against the speed brings the joint to rest \[1/s\]: steps of 0.3 ms stay stable.
 const SIGN_RATE: f64 = 10_000.0;
 
 /// What an effect is built for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Site {
-    pub place: Place,
+pub struct EffectSite {
+    pub place: EffectPlace,
     /// Name of the joint or screw; empty for the robot as a whole.
     pub name: String,
     /// Whether it turns (orders are then per revolution) or slides (per metre).
@@ -42,7 +42,7 @@ pub struct Site {
     pub viscous: f64,
 }
 
-impl Site {
+impl EffectSite {
     /// Index of the joint; 0 where the place is none.
     pub fn joint(&self) -> usize {
         self.place.joint().unwrap_or(0)
@@ -100,16 +100,16 @@ impl PlantRobot<'_> {
 
 /// All places of one robot.
 #[derive(Debug, Clone)]
-pub struct Sites<'a> {
+pub struct RobotSites<'a> {
     pub machine: PlantRobot<'a>,
-    pub joints: Vec<Site>,
-    pub screws: Vec<Site>,
-    pub whole: Vec<Site>,
+    pub joints: Vec<EffectSite>,
+    pub screws: Vec<EffectSite>,
+    pub whole: Vec<EffectSite>,
     /// How warm its drives are.
     pub temperatures: PlantTemperatures,
 }
 
-impl<'a> Sites<'a> {
+impl<'a> RobotSites<'a> {
     /// The places of a plant.
     ///
     /// # Errors
@@ -122,8 +122,8 @@ impl<'a> Sites<'a> {
             None => joints(plant),
         };
         let screws = screws(plant, &joints)?;
-        let whole = joints.first().map(|first| Site {
-            place: Place::All,
+        let whole = joints.first().map(|first| EffectSite {
+            place: EffectPlace::All,
             name: String::new(),
             ..first.clone()
         });
@@ -141,14 +141,14 @@ impl<'a> Sites<'a> {
 }
 
 /// The joints of a robot whose workspace only its file knows, with their inertia in the middle of the travel.
-fn joints<const J: usize>(plant: &Plant<J>) -> Vec<Site> {
+fn joints<const J: usize>(plant: &Plant<J>) -> Vec<EffectSite> {
     let m = &plant.mechanism;
     // one joint alone has its inertia in every pose
     let (least, at, speed) = match m.joints() {
         1 => (1.0, 1.0, 0.2),
         _ => (0.3, 0.5, 0.5),
     };
-    let site = |j: usize| Site {
+    let site = |j: usize| EffectSite {
         scale: plant.laws[j].torque(at).abs(),
         inertia: plant.inertia[j],
         least_inertia: least * plant.inertia[j],
@@ -159,11 +159,11 @@ fn joints<const J: usize>(plant: &Plant<J>) -> Vec<Site> {
 }
 
 /// A joint with its friction at a middling speed, whose inertia and travel are still to be given.
-fn joint<const J: usize>(plant: &Plant<J>, j: usize, speed: f64) -> Site {
+fn joint<const J: usize>(plant: &Plant<J>, j: usize, speed: f64) -> EffectSite {
     let robot = &plant.mechanism.robot;
     let [coulomb, viscous] = plant.laws[j].levels();
-    Site {
-        place: Place::Joint(j),
+    EffectSite {
+        place: EffectPlace::Joint(j),
         name: robot.joint_names()[j].clone(),
         turns: plant.mechanism.turns(j),
         scale: plant.laws[j].torque(speed).abs(),
@@ -217,7 +217,7 @@ fn joints_in<const J: usize>(
     plant: &Plant<J>,
     middle: &[f64; J],
     poses: &[[f64; J]],
-) -> Result<Vec<Site>, SimulateError> {
+) -> Result<Vec<EffectSite>, SimulateError> {
     let m = &plant.mechanism;
     let mut joints = Vec::with_capacity(m.joints());
     for j in 0..m.joints() {
@@ -227,7 +227,7 @@ fn joints_in<const J: usize>(
             true => TURNING_SPEED,
             false => SLIDING_SPEED,
         };
-        let mut site = Site {
+        let mut site = EffectSite {
             inertia: felt(plant, middle, &direction)?,
             least_inertia: f64::INFINITY,
             ..joint(plant, j, speed)
@@ -244,7 +244,10 @@ fn joints_in<const J: usize>(
 }
 
 /// The screws of the pantograph.
-fn screws<const J: usize>(plant: &Plant<J>, joints: &[Site]) -> Result<Vec<Site>, SimulateError> {
+fn screws<const J: usize>(
+    plant: &Plant<J>,
+    joints: &[EffectSite],
+) -> Result<Vec<EffectSite>, SimulateError> {
     let m = &plant.mechanism;
     let mut screws = Vec::new();
     let Some(limits) = m.robot.transmission().limits() else {
@@ -258,8 +261,8 @@ fn screws<const J: usize>(plant: &Plant<J>, joints: &[Site]) -> Result<Vec<Site>
     for (row, name) in m.robot.transmission().screws().iter().enumerate() {
         let mut direction = [0.0; J];
         direction[2..4].copy_from_slice(&jacobian[row]);
-        screws.push(Site {
-            place: Place::Actuator(row),
+        screws.push(EffectSite {
+            place: EffectPlace::Actuator(row),
             name: (*name).to_owned(),
             turns: false,
             // A force on the crank of length L4 that takes the torque of the joint.

@@ -2,7 +2,7 @@
 //!
 //! fc tanh(v/vs) stands where F(v) - viscous v stood, which is taken out.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::smooth_coulomb::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -11,7 +11,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build: |site, _, values| {
         // the viscous friction is that of the law that stays
         let (per_speed, level, viscous) = (1.0 / values[0], values[1], site.viscous);
-        Built::torque(site, move |m| {
+        BuiltLaw::torque(site, move |m| {
             level * (per_speed * m.v).tanh() - (m.friction - viscous * m.v)
         })
     },

@@ -6,9 +6,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{LAWS, PlantLaw, PlantRobot, Site, Sites};
+use super::{EffectSite, LAWS, PlantLaw, PlantRobot, RobotSites};
 use crate::simulate::SimulateError;
-use cft_ident_core::effect::{Entry, Key, Place, Places};
+use cft_ident_core::effect::{EffectPlace, Entry, Key, PlaceRule};
 use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::candidates::CandidateSection;
@@ -111,34 +111,34 @@ impl EffectSpec {
     /// The sites that the effect acts on: the one that is named, or all that the effect may sit at.
     pub(super) fn sites<'a>(
         &self,
-        places: Places,
-        sites: &'a Sites,
-    ) -> Result<&'a [Site], SimulateError> {
+        places: PlaceRule,
+        sites: &'a RobotSites,
+    ) -> Result<&'a [EffectSite], SimulateError> {
         let whole = sites.whole.as_slice();
         let refuse = |why: ErrorText| match whole.first().or(sites.joints.first()) {
             Some(site) => site.refuse(&self.name, why),
             None => SimulateError::unknown_joint("", &[]),
         };
-        let (joints, screws): (&[Site], &[Site]) = match places {
-            Places::Joints | Places::JointsOrAll | Places::Pairs | Places::Others => {
+        let (joints, screws): (&[EffectSite], &[EffectSite]) = match places {
+            PlaceRule::Joints | PlaceRule::JointsOrAll | PlaceRule::Pairs | PlaceRule::Others => {
                 (&sites.joints, &[])
             }
-            Places::Actuators if sites.screws.is_empty() => {
+            PlaceRule::Actuators if sites.screws.is_empty() => {
                 return Err(refuse(ErrorText::new("it sits at the screws of the CFT robot, x_r and y_r").remedy("a single joint's own friction is `nonlinear-viscous`, `asymmetric-friction` or `stribeck`")));
             }
-            Places::Actuators => (&[], &sites.screws),
-            Places::JointsAndActuators => (&sites.joints, &sites.screws),
-            Places::Whole if self.joint.is_some() => {
+            PlaceRule::Actuators => (&[], &sites.screws),
+            PlaceRule::JointsAndActuators => (&sites.joints, &sites.screws),
+            PlaceRule::Whole if self.joint.is_some() => {
                 return Err(refuse(
                     ErrorText::new("it concerns all joints together").remedy("leave the joint out"),
                 ));
             }
-            Places::Whole => (whole, &[]),
+            PlaceRule::Whole => (whole, &[]),
         };
         let Some(name) = &self.joint else {
             return Ok(if screws.is_empty() { joints } else { screws });
         };
-        let named = |list: &'a [Site]| {
+        let named = |list: &'a [EffectSite]| {
             let place = list.iter().position(|site| site.name == *name)?;
             list.get(place..=place)
         };
@@ -168,7 +168,11 @@ impl EffectSpec {
     }
 
     /// One number per key of the effect.
-    pub(super) fn numbers(&self, law: &PlantLaw, site: &Site) -> Result<Vec<f64>, SimulateError> {
+    pub(super) fn numbers(
+        &self,
+        law: &PlantLaw,
+        site: &EffectSite,
+    ) -> Result<Vec<f64>, SimulateError> {
         let keys = law.entry.keys;
         self.check_keys(keys.iter().map(|key| key.name).collect())?;
         let sized = |key: &Key| key.size && self.given(key.name).is_some();
@@ -184,14 +188,19 @@ impl EffectSpec {
 }
 
 impl EffectValue {
-    pub(super) fn new(entry: &Entry, site: &Site, machine: &PlantRobot, numbers: &[f64]) -> Self {
+    pub(super) fn new(
+        entry: &Entry,
+        site: &EffectSite,
+        machine: &PlantRobot,
+        numbers: &[f64],
+    ) -> Self {
         let pairs = || entry.keys.iter().zip(numbers);
         let own = match site.turns {
             true => JointKind::Revolute,
             false => JointKind::Prismatic,
         };
         // Joints are counted from one; `from` is a joint where units follow it.
-        let of_two = matches!(entry.places, Places::Pairs | Places::Others);
+        let of_two = matches!(entry.places, PlaceRule::Pairs | PlaceRule::Others);
         let from = pairs().find(|(key, _)| of_two && key.name == "from");
         let joint = |(_, number): (_, &f64)| (*number - 1.0).max(0.0) as usize;
         let from = from.map_or(own, |pair| machine.robot.joint_kind(joint(pair)));
@@ -203,7 +212,7 @@ impl EffectValue {
         Self {
             effect: entry.name.to_owned(),
             family: entry.family().name().to_owned(),
-            joint: (site.place != Place::All).then(|| site.name.clone()),
+            joint: (site.place != EffectPlace::All).then(|| site.name.clone()),
             parameters: pairs().map(parameter).collect(),
         }
     }

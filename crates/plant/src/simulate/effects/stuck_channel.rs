@@ -1,6 +1,6 @@
 //! `stuck-channel`: a channel shows its last value from the time `at` on for `seconds`.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::stuck_channel::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -9,7 +9,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build: |site, _, values| {
         let (joint, torque) = (site.joint(), values[2] != 0.0);
         let stuck = values[0]..values[0] + values[1];
-        Built::log(false, move |log| {
+        BuiltLaw::log(false, move |log| {
             let mut last = None;
             for (t, value) in log.channel(joint, torque) {
                 match last {

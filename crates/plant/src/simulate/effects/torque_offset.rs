@@ -1,6 +1,6 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::torque_offset::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -8,6 +8,6 @@ pub static LAW: PlantLaw = PlantLaw {
     defaults: |site| vec![0.1 * site.scale],
     build: |site, _, values| {
         let c = values[0];
-        Built::torque(site, move |_| c)
+        BuiltLaw::torque(site, move |_| c)
     },
 };

@@ -1,14 +1,14 @@
 //! `torque-ripple`: a motor whose torque per current varies with its position: the log has
 //! 1 + sin sin(k q) + cos cos(k q) times the torque that acts, k as in `ripple`.
 
-use super::{Built, Effect, PlantLaw, PlantState, ripple};
+use super::{BuiltLaw, Effect, PlantLaw, PlantState, ripple};
 use cft_ident_core::effect::torque_ripple::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
     entry: &ENTRY,
     defaults: |_| vec![12.0, 0.05, 0.0],
     build: |site, _, values| {
-        Built::plant(TorqueRipple {
+        BuiltLaw::plant(TorqueRipple {
             joint: site.joint(),
             wavenumber: ripple::wavenumber(site, values[0]),
             size: values[1].hypot(values[2]),

@@ -1,6 +1,6 @@
 //! `weight`: the moment of a point mass on a lever.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use cft_ident_core::effect::weight::ENTRY;
 use cft_ident_core::explain::ErrorText;
 
@@ -17,6 +17,6 @@ pub static LAW: PlantLaw = PlantLaw {
         }
         // mass times gravity times lever [Nm], and where the lever is level [rad]
         let (moment, level) = (values[0].hypot(values[1]), values[0].atan2(values[1]));
-        Built::torque(site, move |m| moment * (m.q - level).cos())
+        BuiltLaw::torque(site, move |m| moment * (m.q - level).cos())
     },
 };

@@ -3,7 +3,7 @@
 //! `sign=1` turns the sign, `swap` is the number of the joint, counted from one, whose torque channel changes
 //! places with this one's.
 
-use super::{Built, PlantLaw};
+use super::{BuiltLaw, PlantLaw};
 use crate::simulate::SimulateError;
 use cft_ident_core::effect::wrong_sign_or_order::ENTRY;
 
@@ -22,7 +22,7 @@ pub static LAW: PlantLaw = PlantLaw {
             return Err(refuse("swap", swap, &rule));
         }
         let other = machine.other_joint(joint, swap);
-        Built::log(false, move |log| {
+        BuiltLaw::log(false, move |log| {
             if sign == 1.0 {
                 for torque in log.torques(joint) {
                     *torque = -*torque;

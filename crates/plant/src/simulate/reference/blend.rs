@@ -5,7 +5,7 @@
 /// While it runs up or down, its rate follows x^3 (10 - 15 x + 6 x^2): the path in space stays that of
 /// the period, speeds are those of the period at most, and accelerations are continuous.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Blend {
+pub struct TimeScaling {
     /// Time of the series' clock at which the motion begins \[s\].
     pub start: f64,
     /// Time within which the rate goes from 0 to 1, and back \[s\].
@@ -14,7 +14,7 @@ pub struct Blend {
     pub periods: Option<u32>,
 }
 
-impl Blend {
+impl TimeScaling {
     /// Duration of the whole motion \[s\].
     pub(crate) fn end(&self, period: f64) -> Option<f64> {
         let end = |whole| 2.0 * self.seconds + f64::from(whole) * period;
@@ -56,7 +56,7 @@ impl Blend {
 mod tests {
     use super::*;
 
-    const BLEND: Blend = Blend {
+    const BLEND: TimeScaling = TimeScaling {
         start: 0.7,
         seconds: 1.5,
         periods: Some(2),
@@ -85,9 +85,9 @@ mod tests {
             assert_eq!(BLEND.clock(2.5, t), [0.7 + (t - 0.75), 1.0, 0.0]);
         }
         let (periods, seconds) = (None, 0.0);
-        let endless = Blend { periods, ..BLEND };
+        let endless = TimeScaling { periods, ..BLEND };
         assert_eq!(endless.clock(2.5, 100.0), [0.7 + 99.25, 1.0, 0.0]);
-        let at_once = Blend { seconds, ..BLEND };
+        let at_once = TimeScaling { seconds, ..BLEND };
         assert_eq!(at_once.clock(2.5, 0.0), [0.7, 1.0, 0.0]);
         assert_eq!(at_once.clock(2.5, 6.0), [0.7 + 5.0, 0.0, 0.0]);
     }

@@ -5,19 +5,19 @@ use std::f64::consts::TAU;
 
 use rand::RngExt;
 
-use super::{Blend, Target};
+use super::{Target, TimeScaling};
 use crate::simulate::SimulateError;
-use crate::simulate::chance::{Purpose, stream};
-use cft_ident_core::robot::cft::{Setup, practice};
+use crate::simulate::chance::{ChancePurpose, stream};
+use cft_ident_core::robot::cft::{LaboratorySetup, practice};
 use cft_ident_core::robot::practice::Excitation;
 
 /// Positions x_i(t) = offset_i + sum_l a_il/(l w) sin(l w t) - b_il/(l w) cos(l w t), eq. (43).
 ///
 /// The series is entered by running its own clock slowly at first: during the first
-/// [`Fourier::blend`] seconds the phase accelerates from standstill to one second per second, so that
+/// [`FourierReference::blend`] seconds the phase accelerates from standstill to one second per second, so that
 /// the path is that of the series from the start and never leaves its range. It is left in the same way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fourier<const J: usize> {
+pub struct FourierReference<const J: usize> {
     /// Offset per coordinate, m or rad.
     pub offset: [f64; J],
     /// a_l for l = 1, 2, ...: amplitudes of the velocity, m/s or rad/s.
@@ -34,14 +34,14 @@ pub struct Fourier<const J: usize> {
     pub periods: Option<u32>,
 }
 
-impl Fourier<4> {
+impl FourierReference<4> {
     /// The report's excitation trajectory in (x_c1, x_c2, x_c3, x_c4): Table 3 with the printed offsets.
     pub fn table_3() -> Self {
-        Self::of(&practice::of(Setup::Tuedacs).excitation)
+        Self::of(&practice::of(LaboratorySetup::Tuedacs).excitation)
     }
 }
 
-impl<const J: usize> Fourier<J> {
+impl<const J: usize> FourierReference<J> {
     /// Time within which a series reaches full speed, where nothing says otherwise \[s\].
     pub const BLEND: f64 = 2.0;
 
@@ -61,7 +61,7 @@ impl<const J: usize> Fourier<J> {
 
     /// The same series, begun anywhere in its period.
     pub fn at_random_phase(mut self, seed: u64) -> Self {
-        let mut chance = stream(seed, Purpose::Reference);
+        let mut chance = stream(seed, ChancePurpose::Reference);
         self.start = self.period() * chance.random::<f64>();
         self
     }
@@ -115,8 +115,8 @@ impl<const J: usize> Fourier<J> {
         self.ends().end(self.period())
     }
 
-    fn ends(&self) -> Blend {
-        Blend {
+    fn ends(&self) -> TimeScaling {
+        TimeScaling {
             start: self.start,
             seconds: self.blend,
             periods: self.periods,
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn velocity_is_the_derivative_of_position_through_the_blend() {
-        let series = Fourier::table_3();
+        let series = FourierReference::table_3();
         let h = 1e-5;
         for k in 1..200 {
             let t = 0.05 * f64::from(k);
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn motion_starts_at_rest_repeats_itself_and_ends_at_rest_behind_whole_periods() {
-        let endless = Fourier::table_3();
+        let endless = FourierReference::table_3();
         assert_eq!(endless.seconds(), None);
         assert_eq!(endless.at(0.0).velocity, [0.0; 4]);
         let (one, next) = (endless.at(5.0), endless.at(5.0 + endless.period()));
@@ -153,7 +153,7 @@ mod tests {
             assert!((one.position[i] - next.position[i]).abs() < 1e-12);
             assert!((one.velocity[i] - next.velocity[i]).abs() < 1e-12);
         }
-        let series = Fourier {
+        let series = FourierReference {
             periods: Some(3),
             ..endless
         };
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn random_phases_begin_at_rest_on_the_same_path() {
-        let series = Fourier::table_3();
+        let series = FourierReference::table_3();
         let other = series.clone().at_random_phase(4);
         assert_eq!(other, series.clone().at_random_phase(4));
         assert_ne!(other.start, series.clone().at_random_phase(5).start);
@@ -183,7 +183,7 @@ mod tests {
     fn table_3_uses_the_shares_of_the_spans_that_are_known() {
         // Shares of the spans of x_c1..x_c4 in use: 28, 21, 26 and 9 %.
         let spans = [0.315, 0.607, 6.16, 0.595];
-        let series = Fourier::table_3();
+        let series = FourierReference::table_3();
         for (i, (span, share)) in spans.iter().zip([28.0, 21.0, 26.0, 9.0]).enumerate() {
             let values = (0..5000).map(|k| series.at(2.0 + f64::from(k) * 1e-3).position[i]);
             let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
@@ -194,12 +194,12 @@ mod tests {
 
     #[test]
     fn unusable_series_are_refused() {
-        let broken = |change: fn(&mut Fourier<4>)| {
-            let mut series = Fourier::table_3();
+        let broken = |change: fn(&mut FourierReference<4>)| {
+            let mut series = FourierReference::table_3();
             change(&mut series);
             series.check().is_err()
         };
-        assert!(Fourier::table_3().check().is_ok());
+        assert!(FourierReference::table_3().check().is_ok());
         assert!(broken(|s| s.fundamental = 0.0));
         assert!(broken(|s| s.b.truncate(2)));
         assert!(broken(|s| s.a[1][2] = f64::NAN));

@@ -11,9 +11,9 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::stroke::{Meeting, PEAK, Stroke};
+use super::stroke::{PEAK, SpeedStroke, StrokeJunction};
 use crate::simulate::SimulateError;
-use crate::simulate::chance::{Purpose, stream};
+use crate::simulate::chance::{ChancePurpose, stream};
 
 /// What the ladder has to do.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,7 +33,7 @@ pub struct LadderPlan {
 /// The motion: strokes between turning points, in time order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LadderReference {
-    strokes: Vec<Stroke>,
+    strokes: Vec<SpeedStroke>,
     end: f64,
     seconds: f64,
 }
@@ -51,7 +51,7 @@ const PASS: f64 = 20.0;
 
 /// A plateau in the order of the motion: its speed, and whether it goes to the end of the range.
 #[derive(Debug, Clone, Copy)]
-struct Rung {
+struct LadderRung {
     speed: f64,
     sweeps: bool,
 }
@@ -74,7 +74,7 @@ impl LadderPlan {
 
     /// Largest plateau speed whose ramps leave [`PLATEAU_SHARE`] of the range.
     pub(crate) fn fastest((low, high): (f64, f64), acceleration: f64) -> f64 {
-        let ramps = 2.0 * PEAK * Meeting::Turn.distance(1.0);
+        let ramps = 2.0 * PEAK * StrokeJunction::Turn.distance(1.0);
         ((1.0 - PLATEAU_SHARE) * (high - low) * acceleration / ramps).sqrt()
     }
 
@@ -103,7 +103,7 @@ impl LadderPlan {
 
     /// [`LadderPlan::build`] with the chance of a seed, or without.
     pub(crate) fn build_seeded(&self, seed: Option<u64>) -> Result<LadderReference, SimulateError> {
-        let mut chance = seed.map(|seed| stream(seed, Purpose::Reference));
+        let mut chance = seed.map(|seed| stream(seed, ChancePurpose::Reference));
         self.build(chance.as_mut())
     }
 
@@ -163,7 +163,7 @@ impl LadderPlan {
         let (low, high) = self.range;
         // pairs of slow strokes between sweeps of two speeds do not end just where they began
         let hardly = BEYOND_RANGE_SHARE * (high - low);
-        let leaves = |stroke: &&Stroke| {
+        let leaves = |stroke: &&SpeedStroke| {
             let to = stroke.from + stroke.direction * stroke.length();
             !(low - hardly..=high + hardly).contains(&to)
         };
@@ -231,7 +231,7 @@ impl LadderPlan {
     }
 
     /// The strokes in order, the slow ones with that time at their speed.
-    fn lay_out(&self, order: &[Rung], plateau: f64, mirrored: bool) -> LadderReference {
+    fn lay_out(&self, order: &[LadderRung], plateau: f64, mirrored: bool) -> LadderReference {
         let (low, high) = self.range;
         let mut strokes = Vec::with_capacity(order.len());
         let (mut position, mut direction) = if mirrored { (high, -1.0) } else { (low, 1.0) };
@@ -240,11 +240,11 @@ impl LadderPlan {
             let before = k.checked_sub(1).map(|k| order[k].speed);
             let after = order.get(k + 1).map(|r| r.speed);
             let ramp = |neighbour: Option<f64>| {
-                let meeting = neighbour.map_or(Meeting::Rest, |_| Meeting::Turn);
+                let meeting = neighbour.map_or(StrokeJunction::Rest, |_| StrokeJunction::Turn);
                 let acceleration = self.meeting(rung.speed, neighbour.unwrap_or(0.0));
                 (meeting, PEAK * rung.speed / acceleration)
             };
-            let mut stroke = Stroke {
+            let mut stroke = SpeedStroke {
                 start,
                 from: position,
                 direction,
@@ -275,9 +275,9 @@ impl LadderPlan {
 }
 
 /// Each fast speed sweeps there and back; the slow ones follow in pairs, spread evenly behind the sweeps.
-fn interleave(fast: &[f64], slow: &[f64], order: &mut Vec<Rung>) {
+fn interleave(fast: &[f64], slow: &[f64], order: &mut Vec<LadderRung>) {
     let slots = 2 * fast.len();
-    let rung = |speed, sweeps| Rung { speed, sweeps };
+    let rung = |speed, sweeps| LadderRung { speed, sweeps };
     for slot in 0..slots {
         order.push(rung(fast[slot / 2], true));
         for &speed in &slow[slot * slow.len() / slots..(slot + 1) * slow.len() / slots] {

@@ -7,11 +7,11 @@ mod points;
 mod stroke;
 mod travel;
 
-pub use blend::Blend;
-pub use fourier::Fourier;
+pub use blend::TimeScaling;
+pub use fourier::FourierReference;
 pub use ladder::{LadderPlan, LadderReference, TURN};
-pub use points::Points;
-pub use travel::{Travel, middle_part, travel};
+pub use points::SplineReference;
+pub use travel::{JointTravel, middle_part, travel};
 
 use super::SimulateError;
 
@@ -46,7 +46,7 @@ pub enum Path<const J: usize> {
     /// One pose, stationary.
     Hold([f64; J]),
     /// Finite Fourier series, eq. (43).
-    Fourier(Fourier<J>),
+    Fourier(FourierReference<J>),
     /// One coordinate runs a ladder of speeds, the others hold the pose.
     Ladder {
         moving: usize,
@@ -54,7 +54,7 @@ pub enum Path<const J: usize> {
         ladder: LadderReference,
     },
     /// Poses at times.
-    Points(Points<J>),
+    Points(SplineReference<J>),
 }
 
 /// A path and the frame that it is written in.

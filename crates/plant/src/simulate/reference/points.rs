@@ -9,13 +9,13 @@ use cft_ident_core::explain::ErrorText;
 /// Two equal poses in a row are a dwell: the spline is at rest at both of them and the parts before
 /// and after are joined separately, so that a dwell never overshoots.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Points<const J: usize> {
+pub struct SplineReference<const J: usize> {
     times: Vec<f64>,
     positions: Vec<[f64; J]>,
     velocities: Vec<[f64; J]>,
 }
 
-impl<const J: usize> Points<J> {
+impl<const J: usize> SplineReference<J> {
     /// Spline through `points`, each a time \[s\] and a pose \[m or rad\].
     ///
     /// # Errors
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_spline_passes_smoothly_through_every_point_and_rests_where_it_dwells() {
-        let points = Points::new(&LIST).expect("usable list");
+        let points = SplineReference::new(&LIST).expect("usable list");
         for (t, pose) in LIST {
             assert_eq!(points.at(t).position, pose);
         }
@@ -167,7 +167,7 @@ mod tests {
             &[(0.0, [0.0]), (1.0, [f64::NAN])],
         ];
         for list in lists {
-            let outcome = Points::new(list);
+            let outcome = SplineReference::new(list);
             assert!(matches!(outcome, Err(SimulateError::Reference { .. })));
         }
     }

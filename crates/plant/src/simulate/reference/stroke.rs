@@ -2,7 +2,7 @@
 
 /// How a stroke's speed meets zero: at rest, or on its way to the next stroke.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Meeting {
+pub(super) enum StrokeJunction {
     /// v (10 x^3 - 15 x^4 + 6 x^5): no acceleration at zero speed.
     Rest,
     /// v (15 x - 10 x^3 + 3 x^5)/8: the acceleration is largest at zero speed and the next stroke
@@ -13,7 +13,7 @@ pub(super) enum Meeting {
 /// Peak slope of both ramps, in units of speed over ramp time.
 pub(super) const PEAK: f64 = 1.875;
 
-impl Meeting {
+impl StrokeJunction {
     /// Speed at the fraction x of the ramp, over the plateau speed.
     pub(super) fn speed(self, x: f64) -> f64 {
         let x2 = x * x;
@@ -34,19 +34,19 @@ impl Meeting {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stroke {
+pub(super) struct SpeedStroke {
     pub(super) start: f64,
     pub(super) from: f64,
     pub(super) direction: f64,
     pub(super) speed: f64,
     /// Way in: how it begins and how long the ramp takes.
-    pub(super) rise: (Meeting, f64),
+    pub(super) rise: (StrokeJunction, f64),
     pub(super) plateau: f64,
     /// Way out, as the way in.
-    pub(super) fall: (Meeting, f64),
+    pub(super) fall: (StrokeJunction, f64),
 }
 
-impl Stroke {
+impl SpeedStroke {
     pub(super) fn ramps(&self) -> f64 {
         self.speed
             * (self.rise.0.distance(1.0) * self.rise.1 + self.fall.0.distance(1.0) * self.fall.1)

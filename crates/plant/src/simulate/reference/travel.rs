@@ -5,7 +5,7 @@ use crate::simulate::mechanism::Mechanism;
 
 /// Room of one joint around a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Travel {
+pub struct JointTravel {
     /// Lower and upper end, m or rad.
     pub range: (f64, f64),
     /// Speed at which the first motor reaches its own limit somewhere on the way, m/s or rad/s.
@@ -29,7 +29,7 @@ pub fn travel<const J: usize>(
     moving: usize,
     margin: f64,
     motor_speeds: &[f64; J],
-) -> Result<Travel, SimulateError> {
+) -> Result<JointTravel, SimulateError> {
     let (lower, upper) = (mechanism.lower, mechanism.upper);
     let outside = |q: &[f64; J]| {
         let x = mechanism.coordinates(q);
@@ -77,7 +77,7 @@ pub fn travel<const J: usize>(
             top_speed = top_speed.min(motor / speed.abs());
         }
     }
-    Ok(Travel {
+    Ok(JointTravel {
         range: (pose[moving] + low, pose[moving] + high),
         top_speed,
     })

@@ -1,15 +1,15 @@
 //! The integration with effects, whose torques bend and jump, against itself at tighter tolerances.
 
-use cft_ident_core::robot::cft::Setup;
+use cft_ident_core::robot::cft::LaboratorySetup;
 use cft_ident_plant::simulate::cft::{follow, mechanism};
-use cft_ident_plant::simulate::integrate::Tolerance;
+use cft_ident_plant::simulate::integrate::StepTolerance;
 use cft_ident_plant::simulate::{CftTruth, OneJointMove, SimulatedRun};
 
 use super::missing::{perfect, specs};
 
 /// A ladder of q4 that turns at both ends, slow plateaus included.
-fn ladder(text: &str, tolerance: Tolerance) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+fn ladder(text: &str, tolerance: StepTolerance) -> SimulatedRun<4> {
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let reference = OneJointMove::new(2, 10.0, None)
         .reference(&mechanism(truth.setup).expect("four joints"))
         .expect("fits");
@@ -39,8 +39,8 @@ fn tighter_tolerances_move_nothing_that_an_encoder_could_see() {
         "disturbance:q4:at=3.33333,seconds=0.55555,c=5",
         "drift:q4:walk=2",
     ] {
-        let usual = ladder(text, Tolerance::default());
-        let tight = ladder(text, Tolerance::default().scaled(1e-2));
+        let usual = ladder(text, StepTolerance::default());
+        let tight = ladder(text, StepTolerance::default().scaled(1e-2));
         let pairs = usual.actual.q.iter().zip(&tight.actual.q);
         let apart = pairs
             .flat_map(|(a, b)| (0..4).map(move |i| (a[i] - b[i]).abs()))

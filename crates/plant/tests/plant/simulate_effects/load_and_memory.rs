@@ -1,7 +1,7 @@
 //! Effects of load, memory and timing: against the balance of torques and against exact solutions.
 
-use cft_ident_core::robot::cft::Setup;
-use cft_ident_plant::simulate::effects::Sites;
+use cft_ident_core::robot::cft::LaboratorySetup;
+use cft_ident_plant::simulate::effects::RobotSites;
 use cft_ident_plant::simulate::{CftTruth, SimulatedRun};
 
 use super::missing::{Row, assert_missing, axis, friction, missing, pushed, rigid, row, table_3};
@@ -134,7 +134,7 @@ fn backlash_takes_friction_away_for_a_fixed_distance_after_each_reversal() {
 fn presliding_bristles_obey_their_equation_over_position() {
     let (sigma, level) = (2000.0, 7.0 - 2.5);
     let recording = table_3(&["presliding:q4:sigma0=2000"]);
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     // All that opposes the joint beyond viscous friction is sigma0 z.
     let bristles: Vec<f64> = (0..recording.rows())
         .map(|k| {
@@ -185,9 +185,9 @@ fn damped_bristles_add_their_rate() {
 fn elastic_joints_deflect_by_what_the_link_needs() {
     let stiffness = 9000.0;
     let recording = table_3(&["elasticity:q5:stiffness=9000"]);
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let plant = truth.plant().expect("a pose");
-    let sites = Sites::of(&plant).expect("physical");
+    let sites = RobotSites::of(&plant).expect("physical");
     let site = &sites.joints[3];
     let rotor = (0.2 * site.inertia).min(0.3 * site.least_inertia);
     let damping = 2.0 * 0.025 * (stiffness * (site.inertia - rotor)).sqrt();

@@ -1,13 +1,13 @@
 //! Logs of robots with effects, and the torque that the declared model misses in them at the true motion.
 
 use cft_ident_core::robot::JointKind;
-use cft_ident_core::robot::cft::{Coefficients, Setup, dynamics};
+use cft_ident_core::robot::cft::{LaboratorySetup, ReportCoefficients, dynamics};
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_plant::simulate::cft::{excitation, follow};
 use cft_ident_plant::simulate::single_joint::{self, SingleJointTruth};
 use cft_ident_plant::simulate::{
-    CftTruth, EffectSpec, MotorInput, Noise, Sensors, Settings, SimulateError, SimulatedRun,
-    SmoothFriction, Start, VoltSeries, run,
+    CftTruth, EffectSpec, MotionStart, MotorInput, Noise, PlantSensors, Settings, SimulateError,
+    SimulatedRun, SmoothFriction, VoltSeries, run,
 };
 
 pub fn specs(texts: &[&str]) -> Vec<EffectSpec> {
@@ -16,7 +16,7 @@ pub fn specs(texts: &[&str]) -> Vec<EffectSpec> {
 
 pub fn perfect<const J: usize>(seconds: f64) -> Settings<J> {
     Settings {
-        sensors: Sensors::perfect(),
+        sensors: PlantSensors::perfect(),
         seed: 7,
         ..Settings::new(seconds)
     }
@@ -24,11 +24,11 @@ pub fn perfect<const J: usize>(seconds: f64) -> Settings<J> {
 
 /// Table 3 on the synthetic robot: all joints move and turn round.
 pub fn table_3(texts: &[&str]) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     follow(
         &truth,
         &specs(texts),
-        excitation(Setup::Tuedacs),
+        excitation(LaboratorySetup::Tuedacs),
         &perfect(5.0),
     )
     .expect("runs")
@@ -36,14 +36,20 @@ pub fn table_3(texts: &[&str]) -> SimulatedRun<4> {
 
 /// The same with encoder counts and noise, and a seed.
 pub fn noisy(texts: &[&str], seed: u64) -> SimulatedRun<4> {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let mut settings = perfect(3.0);
     settings.seed = seed;
-    settings.sensors = Sensors {
+    settings.sensors = PlantSensors {
         torque_noise: Noise::Relative(0.01),
-        ..Sensors::default()
+        ..PlantSensors::default()
     };
-    follow(&truth, &specs(texts), excitation(Setup::Tuedacs), &settings).expect("runs")
+    follow(
+        &truth,
+        &specs(texts),
+        excitation(LaboratorySetup::Tuedacs),
+        &settings,
+    )
+    .expect("runs")
 }
 
 /// State of one row: positions, speeds, accelerations.
@@ -56,13 +62,13 @@ pub fn row(recording: &SimulatedRun<4>, k: usize) -> Row {
 
 /// M a + C v + G of the declared model.
 pub fn rigid((q, v, a): &Row) -> [f64; 4] {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
-    dynamics::inverse_dynamics(q, v, a, &Coefficients::from_theta12(&truth.printed()))
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
+    dynamics::inverse_dynamics(q, v, a, &ReportCoefficients::from_theta12(&truth.printed()))
 }
 
 /// Friction of the declared model.
 pub fn friction(v: &[f64; 4]) -> [f64; 4] {
-    let laws = CftTruth::synthetic(Setup::Tuedacs).friction;
+    let laws = CftTruth::synthetic(LaboratorySetup::Tuedacs).friction;
     std::array::from_fn(|i| laws[i].torque(v[i]))
 }
 
@@ -134,7 +140,7 @@ pub fn pushed(
         .iter()
         .map(|t| [2.0 * (1.7 * t).sin() + 0.7 * (5.1 * t).cos()])
         .collect();
-    let start = Start::State {
+    let start = MotionStart::State {
         position: [0.0],
         speed: [0.0],
     };

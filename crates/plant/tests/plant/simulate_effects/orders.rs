@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use cft_ident_core::effect::{Places, Unit};
+use cft_ident_core::effect::{PlaceRule, Unit};
 use cft_ident_core::robot::JointKind;
-use cft_ident_core::robot::cft::Setup;
+use cft_ident_core::robot::cft::LaboratorySetup;
 use cft_ident_files::config::model_file::{EffectParameter, EffectSection, Parameter};
 use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_plant::simulate::cft::effects;
@@ -47,11 +47,11 @@ fn every_effect_changes_the_log_of_the_cft_robot_at_its_defaults() {
     let sound = ordered(&robot, &[], 1);
     for kind in LAWS.iter().map(|law| law.entry) {
         let expected = match kind.places {
-            Places::Joints | Places::JointsOrAll | Places::Pairs | Places::Others => {
+            PlaceRule::Joints | PlaceRule::JointsOrAll | PlaceRule::Pairs | PlaceRule::Others => {
                 vec![Some("q4")]
             }
-            Places::Actuators | Places::JointsAndActuators => vec![Some("x_r"), Some("y_r")],
-            Places::Whole => vec![None],
+            PlaceRule::Actuators | PlaceRule::JointsAndActuators => vec![Some("x_r"), Some("y_r")],
+            PlaceRule::Whole => vec![None],
         };
         let text = match (expected[0], kind.name) {
             (Some("q4"), "disturbance") => "disturbance:q4:at=0.5".to_owned(),
@@ -133,7 +133,7 @@ fn effects_without_a_place_are_refused_with_the_reason() {
     assert!(text.contains("no centre of gravity"), "{text}");
     assert!(pushed(&turning, &["counterbalance", "payload"]).is_ok());
 
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let refused = |text: &str| {
         let outcome = effects(&truth, &specs(&[text]));
         outcome.expect_err(text).to_string()
@@ -154,7 +154,7 @@ fn effects_without_a_place_are_refused_with_the_reason() {
 
 #[test]
 fn numbers_that_an_effect_cannot_have_name_the_key() {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     for (text, key) in [
         ("stribeck:q4:vs=0", "vs is 0"),
         ("nonlinear-viscous:q4:p=9", "p is 9"),
@@ -187,7 +187,7 @@ fn numbers_that_an_effect_cannot_have_name_the_key() {
 
 #[test]
 fn one_size_that_is_given_silences_the_other_sizes() {
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let values = |text: &str| {
         let (_, values) = effects(&truth, &specs(&[text])).expect("known");
         values[0]
@@ -217,7 +217,7 @@ fn units_follow_the_joint() {
         let shown = [unit(of, false, true), unit(of, true, true)];
         assert_eq!(shown, [slides, turns]);
     }
-    let truth = CftTruth::synthetic(Setup::Tuedacs);
+    let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let (_, values) = effects(&truth, &specs(&["coupling:q2:from=1"])).expect("known");
     assert_eq!(values[0].parameters["viscous"].unit, "Nm s/m");
     assert_eq!(values[0].parameters["inertia"].unit, "kg m");
@@ -270,7 +270,7 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> EffectSec
 fn effects_of_a_model_run_as_those_of_the_command_line_do() {
     let robot = robot();
     let run = |effects: Vec<EffectSection>, texts: &[&str]| {
-        let plant = CftTruth::synthetic(Setup::Tuedacs).plant();
+        let plant = CftTruth::synthetic(LaboratorySetup::Tuedacs).plant();
         let model = model(&robot, plant.expect("a pose").parameters(), effects);
         let order = Order {
             robot: &robot,
@@ -376,10 +376,12 @@ fn the_page_of_effects_says_what_the_simulator_takes() {
             .collect();
         assert_eq!(cells[2], keys.join("; "), "{}", kind.name);
         let cft = match kind.places {
-            Places::Joints | Places::JointsOrAll | Places::Pairs | Places::Others => "joints",
-            Places::Actuators => "x_r, y_r",
-            Places::JointsAndActuators => "joints, x_r, y_r",
-            Places::Whole => "whole",
+            PlaceRule::Joints | PlaceRule::JointsOrAll | PlaceRule::Pairs | PlaceRule::Others => {
+                "joints"
+            }
+            PlaceRule::Actuators => "x_r, y_r",
+            PlaceRule::JointsAndActuators => "joints, x_r, y_r",
+            PlaceRule::Whole => "whole",
         };
         assert_eq!(cells[4], cft, "{}", kind.name);
         let one = [false, true].map(|turns| {

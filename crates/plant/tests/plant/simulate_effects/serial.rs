@@ -1,14 +1,14 @@
 //! Effects on a serial robot: where they have a place, and a payload and a tilt against the same robot built
 //! with them.
 
-use cft_ident_core::effect::{Entry, Places};
+use cft_ident_core::effect::{Entry, PlaceRule};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::standard::{Body, STANDARD};
 use cft_ident_files::config::RobotFile;
-use cft_ident_plant::simulate::effects::Sites;
-use cft_ident_plant::simulate::moving::Moving;
-use cft_ident_plant::simulate::{Effects, Mechanism, Plant, SimulateError, SmoothFriction};
+use cft_ident_plant::simulate::effects::RobotSites;
+use cft_ident_plant::simulate::moving::MovingPlant;
+use cft_ident_plant::simulate::{Mechanism, Plant, PlantEffects, SimulateError, SmoothFriction};
 
 use super::missing::specs;
 
@@ -85,15 +85,15 @@ fn truth(gravity: [f64; 3], payload: [f64; STANDARD]) -> Plant<3> {
     plant
 }
 
-fn built(truth: &Plant<3>, texts: &[&str]) -> Result<Effects, SimulateError> {
-    Ok(Effects::build(&specs(texts), &Sites::of(truth)?)?.0)
+fn built(truth: &Plant<3>, texts: &[&str]) -> Result<PlantEffects, SimulateError> {
+    Ok(PlantEffects::build(&specs(texts), &RobotSites::of(truth)?)?.0)
 }
 
 /// Where an effect has a place, in the words of docs/developers/effects.md.
 pub fn places(entry: &Entry) -> &'static str {
     let truth = truth([0.0, 0.0, -9.81], [0.0; STANDARD]);
     let fits = |text: &str| built(&truth, &[text]).is_ok();
-    if entry.places == Places::Whole {
+    if entry.places == PlaceRule::Whole {
         return if fits(entry.name) { "whole" } else { "no" };
     }
     let [turns, slides] = ["second", "slide"].map(|joint| fits(&format!("{}:{joint}", entry.name)));
@@ -106,7 +106,7 @@ pub fn places(entry: &Entry) -> &'static str {
 }
 
 /// Largest difference of the accelerations of two plants over states, and the largest acceleration.
-fn apart(one: &Moving<3>, other: &Moving<3>) -> (f64, f64) {
+fn apart(one: &MovingPlant<3>, other: &MovingPlant<3>) -> (f64, f64) {
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     for k in 0..50 {
         let y: [f64; 6] =
@@ -120,8 +120,8 @@ fn apart(one: &Moving<3>, other: &Moving<3>) -> (f64, f64) {
     (worst, largest)
 }
 
-fn moving<'a>(truth: &'a Plant<3>, texts: &[&str]) -> Moving<'a, 3> {
-    Moving {
+fn moving<'a>(truth: &'a Plant<3>, texts: &[&str]) -> MovingPlant<'a, 3> {
+    MovingPlant {
         plant: truth,
         effects: built(truth, texts).expect("a place"),
         volts: [3.0, -2.0, 9.0],

@@ -4,14 +4,14 @@ use std::f64::consts::TAU;
 
 use cft_ident_core::robot::cft::links::{PseudoInertia, base_parameters};
 use cft_ident_core::robot::cft::pantograph::references_of_joints;
-use cft_ident_core::robot::cft::{Setup, linkage, regressor};
+use cft_ident_core::robot::cft::{LaboratorySetup, linkage, regressor};
 use cft_ident_core::robot::standard::{Body, pseudo_inertia};
 use cft_ident_core::robot::tree::pose::{self, Frame};
 use cft_ident_core::robot::tree::space::{add, turn};
 use cft_ident_plant::simulate::CftTruth;
 use cft_ident_plant::simulate::cft::effects;
-use cft_ident_plant::simulate::effects::Effects;
-use cft_ident_plant::simulate::moving::Moving;
+use cft_ident_plant::simulate::effects::PlantEffects;
+use cft_ident_plant::simulate::moving::MovingPlant;
 
 use super::missing::{Row, assert_missing, axis, pushed, specs, table_3};
 
@@ -158,7 +158,7 @@ fn friction_at_a_screw_is_its_force_times_the_slope_of_the_screw_position() {
 fn time_dependent_torques_follow_their_formulas() {
     assert_missing("drift:q1:c=1.5", 0.0, EXACT, |t, _| at(0, 1.5 * t));
     assert_missing("warm-up:q1:k=-0.3,T=2", 0.0, EXACT, |t, (_, v, _)| {
-        let law = CftTruth::synthetic(Setup::Tuedacs).friction[0];
+        let law = CftTruth::synthetic(LaboratorySetup::Tuedacs).friction[0];
         at(0, -0.3 * (1.0 - (-t / 2.0).exp()) * law.torque(v[0]))
     });
     assert_missing("settling-drift:q4:level=2,T=1.3", 0.0, EXACT, |t, _| {
@@ -317,7 +317,7 @@ fn tilted_gravity_pulls_at_every_link_of_the_chain() {
     let links: [Body; 8] = std::array::from_fn(link);
     let truth = CftTruth {
         theta: base_parameters(&links.map(|link| of_body(&link))),
-        ..CftTruth::synthetic(Setup::Tuedacs)
+        ..CftTruth::synthetic(LaboratorySetup::Tuedacs)
     };
     let (gx, gy) = (0.7, -0.4);
     let potential = |q: &[f64; 4]| -> f64 {
@@ -331,7 +331,7 @@ fn tilted_gravity_pulls_at_every_link_of_the_chain() {
     let plant = truth.plant().expect("a pose");
     let load = |texts: &[&str], q: &[f64; 4]| {
         let (effects, _) = effects(&truth, &specs(texts)).expect("known");
-        let moving = Moving {
+        let moving = MovingPlant {
             plant: &plant,
             effects,
             volts: [0.0; 4],
@@ -402,6 +402,6 @@ fn a_single_joint_has_the_same_effects_where_they_have_a_place() {
 
 #[test]
 fn effects_of_nothing_are_not_there() {
-    assert!(Effects::default().is_empty());
+    assert!(PlantEffects::default().is_empty());
     assert_eq!(table_3(&["spring:q2:k=0"]).rows(), 5000);
 }

@@ -4,16 +4,16 @@ use crate::report::encode::extent;
 
 /// A linear map of a closed interval of data onto an interval of px.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Scale {
+pub(super) struct AxisScale {
     pub data: [f64; 2],
     px: [f64; 2],
 }
 
-impl Scale {
+impl AxisScale {
     /// An interval of the data (in order, both finite, not equal) onto `px_from..px_to`.
     pub fn new(data: [f64; 2], px_from: f64, px_to: f64) -> Self {
         let px = [px_from, px_to];
-        Scale { data, px }
+        AxisScale { data, px }
     }
 
     pub(crate) fn px(&self, value: f64) -> f64 {
@@ -36,14 +36,14 @@ pub(super) fn interval(values: impl IntoIterator<Item = f64>, margin: f64) -> Op
 
 /// The numbers at an axis: round, about `wanted` and three at least, with texts of equal precision.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Ticks {
+pub(super) struct AxisTicks {
     pub values: Vec<f64>,
     pub texts: Vec<String>,
     /// The texts are to be multiplied by ten to this power (a multiple of 3, mostly 0).
     pub power: i32,
 }
 
-impl Ticks {
+impl AxisTicks {
     pub fn new([from, to]: [f64; 2], wanted: usize) -> Self {
         // Steps are counted as whole numbers, so that 3 * 0.1 stays 0.3.
         let counted = |step: f64| {
@@ -74,7 +74,7 @@ impl Ticks {
             .iter()
             .map(|value| format!("{:.decimals$}", value / unit).replace('-', "\u{2212}"))
             .collect();
-        Ticks {
+        AxisTicks {
             values,
             texts,
             power,
@@ -121,7 +121,7 @@ mod tests {
             ([0.0, 20.0], 5, "0 5 10 15 20"),
             ([0.0, 0.3], 3, "0.0 0.1 0.2 0.3"),
         ] {
-            assert_eq!(Ticks::new(ends, wanted).texts.join(" "), texts);
+            assert_eq!(AxisTicks::new(ends, wanted).texts.join(" "), texts);
         }
     }
 
@@ -131,7 +131,7 @@ mod tests {
             let half = 1.013f64.powi(k) * 1e-3;
             for (wanted, most) in [(3, 7), (4, 8), (5, 9), (9, 15)] {
                 for from in [-half, 0.4 * half] {
-                    let count = Ticks::new([from, half], wanted).values.len();
+                    let count = AxisTicks::new([from, half], wanted).values.len();
                     assert!(
                         (3..=most).contains(&count),
                         "{from} {half} {wanted}: {count}"
@@ -143,13 +143,13 @@ mod tests {
 
     #[test]
     fn very_large_and_very_small_numbers_share_a_power_of_ten() {
-        let ticks = Ticks::new([0.0, 250_000.0], 5);
+        let ticks = AxisTicks::new([0.0, 250_000.0], 5);
         assert_eq!((ticks.power, ticks.texts[1].as_str()), (3, "50"));
         assert_eq!(ticks.unit("N"), "10\u{b3} N");
-        let ticks = Ticks::new([-4e-6, 4e-6], 4);
+        let ticks = AxisTicks::new([-4e-6, 4e-6], 4);
         assert_eq!(ticks.texts, ["\u{2212}4", "\u{2212}2", "0", "2", "4"]);
         assert_eq!(ticks.unit("Nm"), "10\u{207b}\u{2076} Nm");
-        let ticks = Ticks::new([-6e-4, 6e-4], 3);
+        let ticks = AxisTicks::new([-6e-4, 6e-4], 3);
         assert_eq!((ticks.power, ticks.texts[0].as_str()), (-3, "\u{2212}0.5"));
     }
 

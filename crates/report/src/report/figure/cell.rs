@@ -2,7 +2,7 @@
 //! them are seen on a phone.
 
 use super::legend::{self, Key};
-use super::svg::{Anchor, Svg, Type};
+use super::svg::{SvgPicture, TextAnchor, TextStyle};
 
 /// Width of one picture [px].
 const WIDTH: f64 = 380.0;
@@ -15,7 +15,7 @@ const BELOW: f64 = 40.0;
 
 /// Pictures that belong together, with the sentences below them.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cells {
+pub struct PictureGroup {
     pub title: String,
     /// The entries of the legend, an SVG document each.
     pub key: Vec<String>,
@@ -27,17 +27,17 @@ pub struct Cells {
     pub words: Vec<String>,
 }
 
-impl Cells {
+impl PictureGroup {
     pub(super) fn new(
         title: &str,
         entries: &[(Key, &str)],
         pictures: impl IntoIterator<Item = String>,
     ) -> Self {
-        Cells {
+        PictureGroup {
             title: title.to_owned(),
             key: entries.iter().map(|entry| legend::alone(*entry)).collect(),
             pictures: pictures.into_iter().collect(),
-            ..Cells::default()
+            ..PictureGroup::default()
         }
     }
 }
@@ -47,7 +47,7 @@ pub(super) fn cell(
     title: &str,
     description: &str,
     height: f64,
-    draw: impl FnOnce(&mut Svg, [f64; 4]),
+    draw: impl FnOnce(&mut SvgPicture, [f64; 4]),
 ) -> String {
     below(NAME, [title, description], height, draw)
 }
@@ -57,15 +57,15 @@ pub(super) fn below(
     above: f64,
     [title, description]: [&str; 2],
     height: f64,
-    draw: impl FnOnce(&mut Svg, [f64; 4]),
+    draw: impl FnOnce(&mut SvgPicture, [f64; 4]),
 ) -> String {
-    let mut svg = Svg::new(WIDTH, above + height + BELOW, title, description);
+    let mut svg = SvgPicture::new(WIDTH, above + height + BELOW, title, description);
     draw(&mut svg, [LEFT, above, WIDTH - LEFT - RIGHT, height]);
     svg.finish()
 }
 
 /// The name above a panel.
-pub(super) fn name(svg: &mut Svg, [left, top, ..]: [f64; 4], name: &str) {
-    let style = Type::new(11.5, Anchor::Start).bold();
+pub(super) fn name(svg: &mut SvgPicture, [left, top, ..]: [f64; 4], name: &str) {
+    let style = TextStyle::new(11.5, TextAnchor::Start).bold();
     svg.text([left, top - 8.0], name, style);
 }

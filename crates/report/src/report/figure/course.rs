@@ -1,11 +1,11 @@
 //! Parameters over time: estimates of single logs, the smoothed course with its band, and changes.
 
 use super::axis;
-use super::cell::{self, Cells};
+use super::cell::{self, PictureGroup};
 use super::colour;
 use super::legend::Key;
-use super::panel::Panel;
-use super::svg::{Stroke, Svg, fitted};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture, fitted};
 use cft_ident_core::number;
 
 /// One parameter over time.
@@ -32,8 +32,8 @@ pub(crate) struct CourseFigure {
     pub panels: Vec<CoursePanel>,
 }
 
-const COURSE: Stroke = Stroke::solid(colour::BLUE, 1.8);
-const CHANGE: Stroke = Stroke::dashed(colour::VERMILLION, 1.4, "5 3");
+const COURSE: LineStroke = LineStroke::solid(colour::BLUE, 1.8);
+const CHANGE: LineStroke = LineStroke::dashed(colour::VERMILLION, 1.4, "5 3");
 /// Height of a panel [px].
 const HEIGHT: f64 = 150.0;
 /// Half width of the band of 95 % in standard deviations.
@@ -41,7 +41,7 @@ const BAND: f64 = 1.96;
 
 impl CourseFigure {
     /// The panels as pictures of their own.
-    pub fn cells(&self) -> Cells {
+    pub fn cells(&self) -> PictureGroup {
         let mut key = vec![
             (Key::Spot(colour::MUTED), "estimate of one log"),
             (Key::Band(COURSE), "smoothed, 95 %"),
@@ -54,9 +54,9 @@ impl CourseFigure {
                 panel.draw(svg, frame, &self.time_unit)
             })
         };
-        Cells {
+        PictureGroup {
             apart: true,
-            ..Cells::new(&self.title, &key, self.panels.iter().map(picture))
+            ..PictureGroup::new(&self.title, &key, self.panels.iter().map(picture))
         }
     }
 }
@@ -81,7 +81,7 @@ impl CoursePanel {
         format!("{}: {first} at first, {last} at last; {changes}", self.name)
     }
 
-    fn draw(&self, svg: &mut Svg, frame: [f64; 4], time_unit: &str) {
+    fn draw(&self, svg: &mut SvgPicture, frame: [f64; 4], time_unit: &str) {
         let [left, top, width, height] = frame;
         let name = fitted(&self.name, 11.5, width);
         svg.heading([left, top - 7.0], &name, "");
@@ -91,10 +91,10 @@ impl CoursePanel {
         let values = axis::interval(values, 0.06);
         let times = axis::interval(self.times.iter().copied(), 0.03);
         let (Some(times), Some(values)) = (times, values) else {
-            Panel::empty(svg, frame, "no log determines it");
+            PlotPanel::empty(svg, frame, "no log determines it");
             return;
         };
-        let panel = Panel::new(frame, times, values, [4, 5]);
+        let panel = PlotPanel::new(frame, times, values, [4, 5]);
         panel.grid(svg);
         svg.clip(frame);
         let place = |t: f64, x: f64| [panel.x.px(t), panel.y.px(x)];

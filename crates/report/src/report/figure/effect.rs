@@ -2,10 +2,10 @@
 //! over it, and beside it the residual with it.
 
 use super::axis;
-use super::cell::{self, Cells};
+use super::cell::{self, PictureGroup};
 use super::colour;
 use super::legend::Key;
-use super::panel::Panel;
+use super::panel::PlotPanel;
 
 /// A cloud of rows, and the torque of the effect at each.
 pub(crate) struct EffectFigure {
@@ -30,7 +30,7 @@ const WITH: &str = "residual with it";
 
 impl EffectFigure {
     /// Without the effect and with it, on the same axes; `words` stand below.
-    pub fn cells(&self, words: Vec<String>) -> Cells {
+    pub fn cells(&self, words: Vec<String>) -> PictureGroup {
         let finite = |row: &&[f64; 3]| row.iter().all(|x| x.is_finite());
         let known: Vec<&[f64; 3]> = self.rows.iter().filter(finite).collect();
         let every = known.len().div_ceil(ROWS).max(1);
@@ -39,22 +39,22 @@ impl EffectFigure {
         let left = |row: &[f64; 3]| row[1] - row[2];
         let shown = drawn.iter().flat_map(|row| [row[1], row[2], left(row)]);
         let torques = axis::interval(shown, 0.06);
-        let clouds: [&[Cloud]; 2] = [
+        let clouds: [&[PointCloud]; 2] = [
             &[
                 (&|row| row[1], colour::VERMILLION, 1.3),
                 (&|row| row[2], colour::BLUE, 1.8),
             ],
             &[(&left, colour::INK, 1.3)],
         ];
-        let picture = |(name, clouds): (&str, &[Cloud])| {
+        let picture = |(name, clouds): (&str, &[PointCloud])| {
             let description = format!("{name}. {}", self.description);
             cell::cell(&self.title, &description, HEIGHT, |svg, frame| {
                 cell::name(svg, frame, name);
                 let (Some(signals), Some(torques)) = (signals, torques) else {
-                    Panel::empty(svg, frame, "no rows");
+                    PlotPanel::empty(svg, frame, "no rows");
                     return;
                 };
-                let panel = Panel::new(frame, signals, torques, [5, 6]);
+                let panel = PlotPanel::new(frame, signals, torques, [5, 6]);
                 panel.grid(svg);
                 svg.clip(frame);
                 for (of, fill, radius) in clouds {
@@ -73,15 +73,15 @@ impl EffectFigure {
             (Key::Spot(colour::INK), WITH),
         ];
         let pictures = ["without it", "with it"].into_iter().zip(clouds);
-        Cells {
+        PictureGroup {
             words,
-            ..Cells::new(&self.title, &key, pictures.map(picture))
+            ..PictureGroup::new(&self.title, &key, pictures.map(picture))
         }
     }
 }
 
 /// The value of a row that is drawn, in which colour, and how large the dots are [px].
-type Cloud<'a> = (&'a dyn Fn(&[f64; 3]) -> f64, &'static str, f64);
+type PointCloud<'a> = (&'a dyn Fn(&[f64; 3]) -> f64, &'static str, f64);
 
 #[cfg(test)]
 mod tests {

@@ -2,8 +2,8 @@
 
 use super::colour;
 use super::legend::{self, Key};
-use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
-use crate::report::usual::Usual;
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle, fitted, width_of};
+use crate::report::usual::UsualErrors;
 use cft_ident_core::number;
 
 /// An error and its 95 % confidence interval where that is known, as fractions.
@@ -42,7 +42,7 @@ pub(crate) struct ErrorFigure {
     /// Largest error that is wanted, as a fraction.
     pub limit: Option<f64>,
     /// Errors that are usual.
-    pub usual: Option<Usual>,
+    pub usual: Option<UsualErrors>,
 }
 
 const WIDTH: f64 = 440.0;
@@ -65,19 +65,19 @@ impl ErrorFigure {
         let top = TOP + if self.usual.is_some() { LINE } else { 0.0 };
         let bottom = top + pitch * self.joints.len() as f64;
         let height = bottom + 34.0;
-        let mut svg = Svg::new(WIDTH, height, &self.title, &self.words());
-        let heading = Type::new(14.0, Anchor::Start).bold();
+        let mut svg = SvgPicture::new(WIDTH, height, &self.title, &self.words());
+        let heading = TextStyle::new(14.0, TextAnchor::Start).bold();
         svg.text([14.0, 22.0], &self.title, heading);
         let [before, after] = [colour::VERMILLION, colour::BLUE].map(Key::Patch);
         let mut keys = match compared {
             true => vec![(before, &*self.names[0]), (after, &*self.names[1])],
             false => vec![(after, "error")],
         };
-        let whisker = Stroke::solid(colour::INK, 1.2);
+        let whisker = LineStroke::solid(colour::INK, 1.2);
         if self.bars().any(|bar| bar.interval_95.is_some()) {
             keys.push((Key::Line(whisker), "95 % confidence interval"));
         }
-        let wanted = Stroke::dashed(colour::INK, 1.2, "6 3");
+        let wanted = LineStroke::dashed(colour::INK, 1.2, "6 3");
         keys.extend(self.limit.map(|_| (Key::Line(wanted), "limit")));
         legend::draw(&mut svg, [14.0, 44.0], &keys);
 
@@ -94,16 +94,20 @@ impl ErrorFigure {
             svg.rect(band, colour::COVERED, None);
         }
         for (error, text) in ticks(most) {
-            let grid = Stroke::solid(colour::GRID, 1.0);
+            let grid = LineStroke::solid(colour::GRID, 1.0);
             svg.line([x(error), top - 4.0], [x(error), bottom], grid);
-            let style = Type::new(10.5, Anchor::Middle).muted();
+            let style = TextStyle::new(10.5, TextAnchor::Middle).muted();
             svg.text([x(error), bottom + 15.0], &text, style);
         }
         for (k, joint) in self.joints.iter().enumerate() {
             let row_top = top + pitch * k as f64;
             let name = fitted(&joint.joint, SIZE, left - 26.0);
             let middle = row_top + 0.5 * rows * BAR + 4.0;
-            svg.text([left - 10.0, middle], &name, Type::new(SIZE, Anchor::End));
+            svg.text(
+                [left - 10.0, middle],
+                &name,
+                TextStyle::new(SIZE, TextAnchor::End),
+            );
             let fills = [colour::VERMILLION, colour::BLUE];
             let fills = fills.into_iter().skip(usize::from(joint.before.is_none()));
             for (row, (bar, fill)) in joint.all().zip(fills).enumerate() {
@@ -124,13 +128,17 @@ impl ErrorFigure {
                 if let Some(line) = self.limit.map(x).filter(|x| room.contains(x)) {
                     at = line + 6.0;
                 }
-                svg.text([at, y + 10.0], &words, Type::new(10.5, Anchor::Start));
+                svg.text(
+                    [at, y + 10.0],
+                    &words,
+                    TextStyle::new(10.5, TextAnchor::Start),
+                );
             }
         }
         if let Some(limit) = self.limit {
             svg.line([x(limit), top - 4.0], [x(limit), bottom], wanted);
         }
-        let axis = Stroke::solid(colour::FRAME, 1.0);
+        let axis = LineStroke::solid(colour::FRAME, 1.0);
         svg.line([left, top - 4.0], [left, bottom], axis);
         svg.finish()
     }
@@ -207,7 +215,7 @@ mod tests {
                 after: bar(after),
             }],
             limit: Some(0.1),
-            usual: Some(Usual {
+            usual: Some(UsualErrors {
                 band: [0.031, 0.129],
                 words: "usual: 3.1 to 13 %".to_owned(),
             }),

@@ -2,12 +2,12 @@
 //! and the mean torque of plateaus as an independent check (eq. (29) of the report).
 
 use super::axis;
-use super::cell::{self, Cells};
+use super::cell::{self, PictureGroup};
 use super::colour;
 use super::joint_grid;
 use super::legend::Key;
-use super::panel::Panel;
-use super::svg::{Stroke, Svg, fitted, width_of};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture, fitted, width_of};
 use crate::report::words::listed;
 use cft_ident_core::friction::estimate::FrictionCurvePoint;
 use cft_ident_core::number;
@@ -54,9 +54,9 @@ const DOT: f64 = 2.3;
 const PANEL_HEIGHT_PX: f64 = 180.0;
 const ROWS: usize = 500;
 
-const CURVE: Stroke = Stroke::solid(colour::BLUE, 1.8);
-const BEYOND: Stroke = Stroke::dashed(colour::BLUE, 1.2, "3 3");
-const TRUTH: Stroke = Stroke::dashed(colour::VERMILLION, 1.3, "7 2.5 1.5 2.5");
+const CURVE: LineStroke = LineStroke::solid(colour::BLUE, 1.8);
+const BEYOND: LineStroke = LineStroke::dashed(colour::BLUE, 1.2, "3 3");
+const TRUTH: LineStroke = LineStroke::dashed(colour::VERMILLION, 1.3, "7 2.5 1.5 2.5");
 
 impl FrictionFigure {
     /// The figure as an SVG document.
@@ -70,16 +70,16 @@ impl FrictionFigure {
     }
 
     /// The panels as pictures of their own.
-    pub fn cells(&self) -> Cells {
+    pub fn cells(&self) -> PictureGroup {
         let cell = |panel: &FrictionPanel| {
             let title = format!("friction of {}", panel.joint);
             cell::cell(&title, &panel.words(), PANEL_HEIGHT_PX, |svg, frame| {
                 panel.draw(svg, frame)
             })
         };
-        Cells {
+        PictureGroup {
             apart: true,
-            ..Cells::new(&self.title, &self.entries(), self.panels.iter().map(cell))
+            ..PictureGroup::new(&self.title, &self.entries(), self.panels.iter().map(cell))
         }
     }
 
@@ -120,7 +120,7 @@ impl FrictionPanel {
         })
     }
 
-    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+    fn draw(&self, svg: &mut SvgPicture, frame: [f64; 4]) {
         let [left, top, width, height] = frame;
         let note = match self.note.as_str() {
             "" => String::new(),
@@ -129,10 +129,10 @@ impl FrictionPanel {
         let note = fitted(&note, 11.5, width - width_of(&self.joint, 12.5));
         svg.heading([left, top - 7.0], &self.joint, &note);
         let (Some(speeds), Some(torques)) = (self.speeds(), self.torques()) else {
-            Panel::empty(svg, frame, "no friction found");
+            PlotPanel::empty(svg, frame, "no friction found");
             return;
         };
-        let panel = Panel::new(frame, speeds, torques, [4, 6]);
+        let panel = PlotPanel::new(frame, speeds, torques, [4, 6]);
         for [from, to] in &self.covered {
             let from = panel.x.px(from.max(speeds[0]));
             let to = panel.x.px(to.min(speeds[1]));
@@ -259,13 +259,13 @@ pub(super) fn spread(point: &FrictionCurvePoint) -> [f64; 2] {
 }
 
 /// The outline of curve plus and minus its 95 % [px].
-pub(super) fn band(panel: &Panel, run: &[FrictionCurvePoint]) -> Vec<[f64; 2]> {
+pub(super) fn band(panel: &PlotPanel, run: &[FrictionCurvePoint]) -> Vec<[f64; 2]> {
     let rows = run.iter();
     panel.band(rows.map(|point| [point.v, point.torque, WITHIN_95 * point.std]))
 }
 
 /// A dot with its 95 % bar, capped.
-fn plateau(svg: &mut Svg, panel: &Panel, point: &FrictionCurvePoint) {
+fn plateau(svg: &mut SvgPicture, panel: &PlotPanel, point: &FrictionCurvePoint) {
     if !finite(point) {
         return;
     }
@@ -274,7 +274,7 @@ fn plateau(svg: &mut Svg, panel: &Panel, point: &FrictionCurvePoint) {
         [-1.0, 1.0].map(|side| panel.y.px(point.torque + side * WITHIN_95 * point.std));
     // A bar that the dot hides would only make the dot ragged.
     if point.std.is_finite() && low - high > 2.0 * DOT + 5.0 {
-        let bar = Stroke::solid(colour::INK, 0.9);
+        let bar = LineStroke::solid(colour::INK, 0.9);
         svg.line([at, low], [at, high], bar);
         svg.line([at - 2.5, low], [at + 2.5, low], bar);
         svg.line([at - 2.5, high], [at + 2.5, high], bar);

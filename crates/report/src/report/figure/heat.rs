@@ -1,7 +1,7 @@
 //! Correlations of parameters as a triangle of shaded cells.
 
 use super::colour;
-use super::svg::{Anchor, Stroke, Svg, Type, width_of};
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle, width_of};
 
 /// Parameters and how their errors go together.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,34 +30,38 @@ impl HeatFigure {
         let side = cell * n as f64;
         // the name of the last column reads along the diagonal
         let (width, height) = (left + side + left, TOP + side + 10.0);
-        let mut svg = Svg::new(width, height, &self.title, &self.strongest());
-        let heading = Type::new(14.0, Anchor::Start).bold();
+        let mut svg = SvgPicture::new(width, height, &self.title, &self.strongest());
+        let heading = TextStyle::new(14.0, TextAnchor::Start).bold();
         svg.text([12.0, 20.0], &self.title, heading);
         self.key(&mut svg);
         for (row, name) in self.names.iter().enumerate() {
             let y = TOP + cell * row as f64;
             let middle = y + 0.5 * cell + 0.36 * size;
-            svg.text([left - 6.0, middle], name, Type::new(size, Anchor::End));
+            svg.text(
+                [left - 6.0, middle],
+                name,
+                TextStyle::new(size, TextAnchor::End),
+            );
             for (column, value) in self.values[row].iter().take(row).enumerate() {
                 let x = left + cell * column as f64;
                 shade(&mut svg, [x, y, cell], *value);
             }
             // names of the columns stand on the diagonal
             let at = [left + cell * row as f64 + 3.0, middle];
-            svg.text(at, name, Type::new(size, Anchor::Start).muted());
+            svg.text(at, name, TextStyle::new(size, TextAnchor::Start).muted());
         }
-        let frame = Stroke::solid(colour::FRAME, 0.8);
+        let frame = LineStroke::solid(colour::FRAME, 0.8);
         svg.line([left, TOP], [left, TOP + side], frame);
         svg.line([left, TOP + side], [left + side, TOP + side], frame);
         svg.finish()
     }
 
-    fn key(&self, svg: &mut Svg) {
+    fn key(&self, svg: &mut SvgPicture) {
         let steps = [-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0];
         for (k, value) in steps.into_iter().enumerate() {
             shade(svg, [44.0 + 16.0 * k as f64, 28.0, 16.0], value);
         }
-        let style = Type::new(10.5, Anchor::Start).muted();
+        let style = TextStyle::new(10.5, TextAnchor::Start).muted();
         svg.text([12.0, 40.0], "\u{2212}1", style);
         svg.text([44.0 + 16.0 * 8.0 + 6.0, 40.0], "+1", style);
     }
@@ -79,7 +83,7 @@ impl HeatFigure {
 }
 
 /// A cell, darker the stronger the correlation: vermillion above zero, blue below.
-fn shade(svg: &mut Svg, [x, y, cell]: [f64; 3], value: f64) {
+fn shade(svg: &mut SvgPicture, [x, y, cell]: [f64; 3], value: f64) {
     let share = (SHADES * value.abs().min(1.0)).round() / SHADES;
     if share > 0.0 {
         let fill = match value > 0.0 {

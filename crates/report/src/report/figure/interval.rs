@@ -1,10 +1,10 @@
 //! Parameters with their 95 % intervals, each beside the value that the robot file has of it: a line each, scaled to the
 //! largest of its numbers, so that kilograms and newton metres stand below each other.
 
-use super::cell::Cells;
+use super::cell::PictureGroup;
 use super::colour;
 use super::legend::Key;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle, fitted, width_of};
 
 /// One parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +41,7 @@ const SIZE: f64 = 11.0;
 
 impl IntervalFigure {
     /// Pictures of a few parameters each.
-    pub fn cells(&self) -> Cells {
+    pub fn cells(&self) -> PictureGroup {
         let interval = Key::Dot(colour::BLUE);
         let mut key = vec![(interval, "fitted, 95 % interval")];
         if self.rows.iter().any(|row| row.before.is_some()) {
@@ -51,7 +51,7 @@ impl IntervalFigure {
             key.push((Key::Spot(colour::SKY), "physically consistent, in use"));
         }
         let pictures = self.rows.chunks(ROWS).map(|rows| self.picture(rows));
-        let mut cells = Cells::new(&self.title, &key, pictures);
+        let mut cells = PictureGroup::new(&self.title, &key, pictures);
         cells.apart = true;
         cells
     }
@@ -62,9 +62,9 @@ impl IntervalFigure {
             .iter()
             .map(|row| format!("{} {}", row.name, row.words))
             .collect();
-        let mut svg = Svg::new(WIDTH, height, &self.title, &words.join("; "));
+        let mut svg = SvgPicture::new(WIDTH, height, &self.title, &words.join("; "));
         let middle = 0.5 * WIDTH;
-        let zero = Stroke::solid(colour::ZERO, 1.0);
+        let zero = LineStroke::solid(colour::ZERO, 1.0);
         svg.line([middle, 0.0], [middle, height], zero);
         for (k, row) in rows.iter().enumerate() {
             row.draw(&mut svg, ROW * k as f64);
@@ -74,7 +74,7 @@ impl IntervalFigure {
 }
 
 impl IntervalRow {
-    fn draw(&self, svg: &mut Svg, top: f64) {
+    fn draw(&self, svg: &mut SvgPicture, top: f64) {
         let room = WIDTH - 2.0 * SIDE;
         let number = width_of(&self.words, SIZE);
         let name = fitted(&self.name, SIZE, room - number - SIDE);
@@ -82,9 +82,9 @@ impl IntervalRow {
         svg.text(
             [SIDE, top + 13.0],
             &name,
-            Type::new(SIZE, Anchor::Start).bold(),
+            TextStyle::new(SIZE, TextAnchor::Start).bold(),
         );
-        let at_right = Type::new(SIZE, Anchor::End);
+        let at_right = TextStyle::new(SIZE, TextAnchor::End);
         svg.text([WIDTH - SIDE, top + 13.0], &self.words, at_right);
         let ends = [self.value - self.half, self.value + self.half];
         let others = self.before.into_iter().chain(self.in_use);
@@ -92,16 +92,16 @@ impl IntervalRow {
         let most = all.fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
         let x = |value: f64| SIDE + 0.5 * room * (1.0 + (value / most).clamp(-1.0, 1.0));
         let level = top + 24.0;
-        let axis = Stroke::solid(colour::GRID, 1.0);
+        let axis = LineStroke::solid(colour::GRID, 1.0);
         svg.line([SIDE, level], [WIDTH - SIDE, level], axis);
-        let bar = Stroke::solid(colour::BLUE, 2.0);
+        let bar = LineStroke::solid(colour::BLUE, 2.0);
         svg.line([x(ends[0]), level], [x(ends[1]), level], bar);
         for end in ends {
             svg.line([x(end), level - 4.0], [x(end), level + 4.0], bar);
         }
         svg.dot([x(self.value), level], 3.4, colour::BLUE);
         if let Some(value) = self.in_use {
-            let ring = Stroke::solid(colour::INK, 0.8);
+            let ring = LineStroke::solid(colour::INK, 0.8);
             svg.ringed([x(value), level], 2.6, colour::SKY, ring);
         }
         if let Some(value) = self.before {

@@ -2,7 +2,7 @@
 //! beside each other.
 
 use super::legend::{self, Key};
-use super::svg::Svg;
+use super::svg::SvgPicture;
 
 const WIDTH: f64 = 760.0;
 const LEFT: f64 = 64.0;
@@ -17,7 +17,7 @@ pub(super) fn draw<P>(
     titles: [&str; 2],
     entries: &[(Key, &str)],
     panels: &[P],
-    draw: impl Fn(&P, &mut Svg, [f64; 4]),
+    draw: impl Fn(&P, &mut SvgPicture, [f64; 4]),
 ) -> String {
     let columns = panels.len().clamp(1, 2);
     let row = NAME + PLOT + BELOW;

@@ -1,14 +1,14 @@
 //! The legend: one line of samples and names, outside the data.
 
 use super::colour;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle, fitted, width_of};
 
 /// The mark before a name.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Key {
-    Line(Stroke),
+    Line(LineStroke),
     /// A line on a band of its colour.
-    Band(Stroke),
+    Band(LineStroke),
     /// A dot with an error bar.
     Dot(&'static str),
     /// A dot of a cloud.
@@ -31,10 +31,14 @@ pub(super) fn headed(
     [left, right]: [f64; 2],
     [title, description]: [&str; 2],
     entries: &[(Key, &str)],
-) -> Svg {
-    let mut svg = Svg::new(width, height, title, description);
+) -> SvgPicture {
+    let mut svg = SvgPicture::new(width, height, title, description);
     let shown = fitted(title, 15.0, width - left - right);
-    svg.text([left, 22.0], &shown, Type::new(14.0, Anchor::Start).bold());
+    svg.text(
+        [left, 22.0],
+        &shown,
+        TextStyle::new(14.0, TextAnchor::Start).bold(),
+    );
     draw(&mut svg, [left, 44.0], entries);
     svg
 }
@@ -43,13 +47,13 @@ pub(super) fn headed(
 pub(super) fn alone(entry: (Key, &str)) -> String {
     let (_, name) = entry;
     let width = SAMPLE + 6.0 + width_of(name, SIZE) + ROOM_BETWEEN_PX;
-    let mut svg = Svg::new(width, LINE, "legend", name);
+    let mut svg = SvgPicture::new(width, LINE, "legend", name);
     draw(&mut svg, [0.0, 0.72 * LINE], &[entry]);
     svg.finish()
 }
 
 /// Draws the legend from `x` rightwards, its baseline at `y`.
-pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
+pub(super) fn draw(svg: &mut SvgPicture, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
     let mut at = x;
     for (key, name) in entries {
         let width = SAMPLE + 6.0 + width_of(name, SIZE);
@@ -65,13 +69,13 @@ pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
             }
             Key::Dot(fill) => {
                 let centre = at + 0.5 * SAMPLE;
-                let bar = Stroke::solid(fill, 1.0);
+                let bar = LineStroke::solid(fill, 1.0);
                 svg.line([centre, middle - 6.0], [centre, middle + 6.0], bar);
                 svg.dot([centre, middle], 2.6, fill);
             }
             Key::Spot(fill) => svg.dot([at + 0.5 * SAMPLE, middle], 2.6, fill),
             Key::Hatch => {
-                let line = Stroke::solid(colour::ZERO, 0.9);
+                let line = LineStroke::solid(colour::ZERO, 0.9);
                 for k in 0..4 {
                     let x = at + 6.0 * f64::from(k);
                     svg.line([x, middle + 5.0], [x + 8.0, middle - 5.0], line);
@@ -80,10 +84,14 @@ pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
             Key::Patch(fill) => svg.rect(
                 [at, middle - 5.0, SAMPLE, 10.0],
                 fill,
-                Some(Stroke::solid(colour::GRID, 0.6)),
+                Some(LineStroke::solid(colour::GRID, 0.6)),
             ),
         }
-        svg.text([at + SAMPLE + 6.0, y], name, Type::new(SIZE, Anchor::Start));
+        svg.text(
+            [at + SAMPLE + 6.0, y],
+            name,
+            TextStyle::new(SIZE, TextAnchor::Start),
+        );
         at += width + ROOM_BETWEEN_PX;
     }
 }

@@ -1,11 +1,11 @@
 //! A residual over two signals: means over cells as a map, and over the first of them as a curve with its 95 % band.
 
 use super::axis;
-use super::cell::{self, Cells};
+use super::cell::{self, PictureGroup};
 use super::colour;
 use super::legend::Key;
-use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle};
 use cft_ident_core::number;
 
 /// Means of a residual.
@@ -28,7 +28,7 @@ pub struct MapFigure {
 
 /// Height of a panel \[px\].
 const HEIGHT: f64 = 220.0;
-const CURVE: Stroke = Stroke::solid(colour::INK, 1.8);
+const CURVE: LineStroke = LineStroke::solid(colour::INK, 1.8);
 /// Half width of the band of 95 % in standard errors.
 const BAND: f64 = 1.96;
 /// Distance of the lines that stand for too few rows \[px\].
@@ -41,7 +41,7 @@ const SHADES: f64 = 8.0;
 
 impl MapFigure {
     /// Map and curve; `words` stand below.
-    pub fn cells(&self, words: Vec<String>) -> Cells {
+    pub fn cells(&self, words: Vec<String>) -> PictureGroup {
         let means = || self.cells.iter().flatten().flatten();
         let most = means().fold(0.0, |most: f64, mean| most.max(mean.abs()));
         let end = number::significant(most, 2);
@@ -52,9 +52,9 @@ impl MapFigure {
         let ([first, second], finding) = (self.over.each_ref().map(|o| &o.0), &self.description);
         let both = format!("mean over {first} and {second}. {finding}");
         let one = format!("mean over {first}. {finding}");
-        let map = |svg: &mut Svg, frame| self.map(svg, frame, most);
+        let map = |svg: &mut SvgPicture, frame| self.map(svg, frame, most);
         let map = cell::cell(&self.title, &both, HEIGHT, map);
-        let curve = |svg: &mut Svg, frame| self.line(svg, frame);
+        let curve = |svg: &mut SvgPicture, frame| self.line(svg, frame);
         let curve = cell::cell(&self.title, &one, HEIGHT, curve);
         let key = [
             (Key::Spot(colour::VERMILLION), &*above),
@@ -62,21 +62,21 @@ impl MapFigure {
             (Key::Hatch, "too few rows"),
             (Key::Band(CURVE), "mean, 95 %"),
         ];
-        Cells {
+        PictureGroup {
             words,
-            ..Cells::new(&self.title, &key, [map, curve])
+            ..PictureGroup::new(&self.title, &key, [map, curve])
         }
     }
 
-    fn map(&self, svg: &mut Svg, frame: [f64; 4], most: f64) {
+    fn map(&self, svg: &mut SvgPicture, frame: [f64; 4], most: f64) {
         cell::name(svg, frame, "over both");
         if most <= 0.0 {
-            Panel::empty(svg, frame, "no rows");
+            PlotPanel::empty(svg, frame, "no rows");
             return;
         }
         let bar = [frame[0] + frame[2] - BAR, frame[1], BAR_WIDTH, frame[3]];
         let frame = [frame[0], frame[1], frame[2] - BAR - 10.0, frame[3]];
-        let panel = Panel::new(frame, self.ends[0], self.ends[1], [5, 6]);
+        let panel = PlotPanel::new(frame, self.ends[0], self.ends[1], [5, 6]);
         svg.clip(frame);
         hatch(svg, frame);
         for (y, line) in self.cells.iter().enumerate() {
@@ -105,7 +105,7 @@ impl MapFigure {
     }
 
     /// The shades and the means that they stand for.
-    fn bar(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4], most: f64) {
+    fn bar(&self, svg: &mut SvgPicture, [left, top, width, height]: [f64; 4], most: f64) {
         let step = 0.5 * height / SHADES;
         svg.rect([left, top, width, height], colour::PAPER, None);
         let middle = top + 0.5 * height;
@@ -119,7 +119,7 @@ impl MapFigure {
                 svg.area(&patch, fill, shade);
             }
         }
-        let style = Type::new(10.0, Anchor::Start);
+        let style = TextStyle::new(10.0, TextAnchor::Start);
         let end = number::significant(most, 2);
         for (y, text) in [
             (top + 7.0, format!("+{end}")),
@@ -131,15 +131,15 @@ impl MapFigure {
         svg.text([left, top - 6.0], &self.unit, style.muted());
     }
 
-    fn line(&self, svg: &mut Svg, frame: [f64; 4]) {
+    fn line(&self, svg: &mut SvgPicture, frame: [f64; 4]) {
         cell::name(svg, frame, &format!("over {}", self.over[0].0));
         let ends = |[_, mean, std]: &[f64; 3]| [mean - BAND * std, mean + BAND * std];
         let torques = axis::interval(self.curve.iter().flat_map(ends).chain([0.0]), 0.06);
         let Some(torques) = torques.filter(|_| self.curve.len() > 1) else {
-            Panel::empty(svg, frame, "no rows");
+            PlotPanel::empty(svg, frame, "no rows");
             return;
         };
-        let panel = Panel::new(frame, self.ends[0], torques, [5, 6]);
+        let panel = PlotPanel::new(frame, self.ends[0], torques, [5, 6]);
         panel.grid(svg);
         svg.clip(frame);
         let rows = self.curve.iter();
@@ -154,11 +154,11 @@ impl MapFigure {
 }
 
 /// Lines across a frame: where no cell is.
-fn hatch(svg: &mut Svg, [left, top, width, height]: [f64; 4]) {
+fn hatch(svg: &mut SvgPicture, [left, top, width, height]: [f64; 4]) {
     let lines = ((width + height) / HATCH) as usize;
     for k in 0..=lines {
         let x = left - height + HATCH * k as f64;
-        let stroke = Stroke::solid(colour::ZERO, 0.8);
+        let stroke = LineStroke::solid(colour::ZERO, 0.8);
         svg.line([x, top + height], [x + height, top], stroke);
     }
 }

@@ -27,7 +27,7 @@ mod sketch;
 mod svg;
 mod torque;
 
-pub use cell::Cells;
+pub use cell::PictureGroup;
 pub(crate) use course::{CourseFigure, CoursePanel};
 pub(crate) use effect::EffectFigure;
 pub(crate) use errors::{ErrorBar, ErrorFigure, JointBars};
@@ -40,8 +40,8 @@ pub use overlay::{OverlayFigure, OverlayPanel};
 pub use png::{PngError, png};
 pub use position::{PositionFigure, PositionPanel};
 pub use rate::{RateFigure, RatePanel};
-pub use residual::{ResidualFigure, ResidualPanel, When};
-pub(crate) use sketch::{Sketch, SketchJoint};
+pub use residual::{ResidualFigure, ResidualLine, ResidualPanel};
+pub(crate) use sketch::{PoseSketch, SketchJoint};
 pub(crate) use torque::parted;
 pub use torque::{JointTorque, TorqueFigure};
 

@@ -4,8 +4,8 @@ use super::axis;
 use super::colour;
 use super::decimate::decimated;
 use super::legend::{self, Key};
-use super::panel::Panel;
-use super::svg::{Stroke, Svg, fitted, width_of};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture, fitted, width_of};
 use crate::report::words::listed;
 use cft_ident_core::number;
 
@@ -47,8 +47,8 @@ const POINTS: usize = 900;
 /// Use of a limit from which on the panel shows it; below it the motion itself fills the panel.
 const LIMIT_SHOWN_FROM: f64 = 0.45;
 
-const MOTION: Stroke = Stroke::solid(colour::BLUE, 1.3);
-const LIMIT: Stroke = Stroke::dashed(colour::VERMILLION, 1.2, "6 3");
+const MOTION: LineStroke = LineStroke::solid(colour::BLUE, 1.3);
+const LIMIT: LineStroke = LineStroke::dashed(colour::VERMILLION, 1.2, "6 3");
 
 impl MotionFigure {
     /// The figure as an SVG document.
@@ -82,11 +82,11 @@ impl MotionFigure {
 impl MotionPanel {
     fn draw(
         &self,
-        svg: &mut Svg,
+        svg: &mut SvgPicture,
         frame: [f64; 4],
         name: &str,
         (t, clock): (&[f64], Option<[f64; 2]>),
-    ) -> Option<Panel> {
+    ) -> Option<PlotPanel> {
         let [left, top, width, _] = frame;
         let used = self.used.map_or(String::new(), |used| {
             format!(", {} of its limit", number::percent(used))
@@ -99,10 +99,10 @@ impl MotionPanel {
         let values = self.values.iter().copied();
         let both = values.chain(shown.into_iter().flatten());
         let (Some(clock), Some(range)) = (clock, axis::interval(both, 0.06)) else {
-            Panel::empty(svg, frame, "no samples");
+            PlotPanel::empty(svg, frame, "no samples");
             return None;
         };
-        let panel = Panel::new(frame, clock, range, [5, 5]);
+        let panel = PlotPanel::new(frame, clock, range, [5, 5]);
         panel.grid(svg);
         svg.clip(frame);
         svg.curve(&panel.place(decimated(t, &self.values, POINTS)), MOTION);

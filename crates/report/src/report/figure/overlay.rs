@@ -1,13 +1,13 @@
 //! Friction curves of two models over each other, joint by joint.
 
 use super::axis;
-use super::cell::{self, Cells};
+use super::cell::{self, PictureGroup};
 use super::colour;
 use super::friction::{band, lines, runs, spread};
 use super::joint_grid;
 use super::legend::Key;
-use super::panel::Panel;
-use super::svg::{Stroke, Svg, fitted};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture, fitted};
 use crate::report::words::listed;
 use cft_ident_core::friction::estimate::FrictionCurvePoint;
 
@@ -44,14 +44,14 @@ const PANEL_HEIGHT_PX: f64 = 180.0;
 const ROWS: usize = 500;
 
 /// Distinguished by dashes as well as by colour.
-const STROKES: [Stroke; 2] = [
-    Stroke::solid(colour::VERMILLION, 1.8),
-    Stroke::dashed(colour::BLUE, 1.6, "7 3"),
+const STROKES: [LineStroke; 2] = [
+    LineStroke::solid(colour::VERMILLION, 1.8),
+    LineStroke::dashed(colour::BLUE, 1.6, "7 3"),
 ];
 
 impl OverlayFigure {
     /// The panels as pictures of their own.
-    pub fn cells(&self) -> Cells {
+    pub fn cells(&self) -> PictureGroup {
         let picture = |panel: &OverlayPanel| {
             let title = format!("friction of {}", panel.joint);
             let described = format!("{title} by {} and {}", self.names[0], self.names[1]);
@@ -63,9 +63,9 @@ impl OverlayFigure {
         let keys: Vec<(Key, &str)> = keys
             .map(|(stroke, name)| (Key::Band(*stroke), name.as_str()))
             .collect();
-        Cells {
+        PictureGroup {
             apart: true,
-            ..Cells::new(&self.title, &keys, self.panels.iter().map(picture))
+            ..PictureGroup::new(&self.title, &keys, self.panels.iter().map(picture))
         }
     }
 
@@ -84,7 +84,7 @@ impl OverlayFigure {
 }
 
 impl OverlayPanel {
-    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+    fn draw(&self, svg: &mut SvgPicture, frame: [f64; 4]) {
         let [left, top, ..] = frame;
         svg.heading([left, top - 7.0], &self.joint, "");
         let points = || self.curves.iter().flatten();
@@ -93,10 +93,10 @@ impl OverlayPanel {
         let torques = points().flat_map(spread).chain(rows().map(|r| r[1]));
         let torques = axis::interval(torques, 0.06);
         let (Some(speeds), Some(torques)) = (speeds, torques) else {
-            Panel::empty(svg, frame, "no friction in either model");
+            PlotPanel::empty(svg, frame, "no friction in either model");
             return;
         };
-        let panel = Panel::new(frame, speeds, torques, [4, 6]);
+        let panel = PlotPanel::new(frame, speeds, torques, [4, 6]);
         panel.grid(svg);
         svg.clip(frame);
         for (curve, stroke) in self.curves.iter().zip(STROKES) {

@@ -1,33 +1,33 @@
 //! One frame with grid, ticks and axis titles; the figures put their data into it.
 
-use super::axis::{Scale, Ticks};
+use super::axis::{AxisScale, AxisTicks};
 use super::colour;
-use super::svg::{Anchor, Stroke, Svg, Type};
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle};
 
 const TICK: f64 = 10.0;
 const LABEL: f64 = 11.0;
 
 /// A frame and its two scales.
 #[derive(Debug)]
-pub(super) struct Panel {
+pub(super) struct PlotPanel {
     /// x, y, width, height [px].
     pub frame: [f64; 4],
-    pub x: Scale,
-    pub y: Scale,
-    x_ticks: Ticks,
-    y_ticks: Ticks,
+    pub x: AxisScale,
+    pub y: AxisScale,
+    x_ticks: AxisTicks,
+    y_ticks: AxisTicks,
 }
 
-impl Panel {
+impl PlotPanel {
     /// A frame for these intervals of data, with about so many numbers at each axis.
     pub fn new(frame: [f64; 4], x: [f64; 2], y: [f64; 2], wanted: [usize; 2]) -> Self {
         let [left, top, width, height] = frame;
-        Panel {
+        PlotPanel {
             frame,
-            x: Scale::new(x, left, left + width),
-            y: Scale::new(y, top + height, top),
-            x_ticks: Ticks::new(x, wanted[0]),
-            y_ticks: Ticks::new(y, wanted[1]),
+            x: AxisScale::new(x, left, left + width),
+            y: AxisScale::new(y, top + height, top),
+            x_ticks: AxisTicks::new(x, wanted[0]),
+            y_ticks: AxisTicks::new(y, wanted[1]),
         }
     }
 
@@ -52,7 +52,7 @@ impl Panel {
     }
 
     /// Grid lines; the lines of 0 are darker.
-    pub fn grid(&self, svg: &mut Svg) {
+    pub fn grid(&self, svg: &mut SvgPicture) {
         let [left, top, width, height] = self.frame;
         let stroke = |value: f64| {
             let colour = if value == 0.0 {
@@ -60,7 +60,7 @@ impl Panel {
             } else {
                 colour::GRID
             };
-            Stroke::solid(colour, 0.8)
+            LineStroke::solid(colour, 0.8)
         };
         for &value in &self.x_ticks.values {
             let at = self.x.px(value);
@@ -73,7 +73,7 @@ impl Panel {
     }
 
     /// The frame itself, and numbers and title of the lower and of the left axis: their names and units.
-    pub fn axes(&self, svg: &mut Svg, offset: f64, below: [&str; 2], at_left: [&str; 2]) {
+    pub fn axes(&self, svg: &mut SvgPicture, offset: f64, below: [&str; 2], at_left: [&str; 2]) {
         self.outline(svg);
         self.x_numbers(svg);
         self.x_title(svg, below);
@@ -81,51 +81,63 @@ impl Panel {
     }
 
     /// The frame itself and the numbers at the left side.
-    pub(crate) fn outline(&self, svg: &mut Svg) {
+    pub(crate) fn outline(&self, svg: &mut SvgPicture) {
         let [left, ..] = self.frame;
-        svg.rect(self.frame, "none", Some(Stroke::solid(colour::FRAME, 0.9)));
+        svg.rect(
+            self.frame,
+            "none",
+            Some(LineStroke::solid(colour::FRAME, 0.9)),
+        );
         for (&value, text) in self.y_ticks.values.iter().zip(&self.y_ticks.texts) {
             let at = self.y.px(value);
-            let mark = Stroke::solid(colour::FRAME, 0.9);
+            let mark = LineStroke::solid(colour::FRAME, 0.9);
             svg.line([left - 4.0, at], [left, at], mark);
-            let style = Type::new(TICK, Anchor::End);
+            let style = TextStyle::new(TICK, TextAnchor::End);
             svg.text([left - 7.0, at + 0.35 * TICK], text, style);
         }
     }
 
     /// The numbers below.
-    pub(crate) fn x_numbers(&self, svg: &mut Svg) {
+    pub(crate) fn x_numbers(&self, svg: &mut SvgPicture) {
         let [_, top, _, height] = self.frame;
         for (&value, text) in self.x_ticks.values.iter().zip(&self.x_ticks.texts) {
             let at = self.x.px(value);
             let bottom = top + height;
-            let mark = Stroke::solid(colour::FRAME, 0.9);
+            let mark = LineStroke::solid(colour::FRAME, 0.9);
             svg.line([at, bottom], [at, bottom + 4.0], mark);
-            svg.text([at, bottom + 15.0], text, Type::new(TICK, Anchor::Middle));
+            svg.text(
+                [at, bottom + 15.0],
+                text,
+                TextStyle::new(TICK, TextAnchor::Middle),
+            );
         }
     }
 
     /// The title of the lower axis, `name [unit]`.
-    pub(crate) fn x_title(&self, svg: &mut Svg, [name, unit]: [&str; 2]) {
+    pub(crate) fn x_title(&self, svg: &mut SvgPicture, [name, unit]: [&str; 2]) {
         let [left, top, width, height] = self.frame;
         let title = format!("{name} [{}]", self.x_ticks.unit(unit));
         let at = [left + 0.5 * width, top + height + 31.0];
-        svg.text(at, &title, Type::new(LABEL, Anchor::Middle));
+        svg.text(at, &title, TextStyle::new(LABEL, TextAnchor::Middle));
     }
 
     /// The title of the left axis, `name [unit]`, `offset` px left of the frame.
-    pub(crate) fn y_title(&self, svg: &mut Svg, offset: f64, [name, unit]: [&str; 2]) {
+    pub(crate) fn y_title(&self, svg: &mut SvgPicture, offset: f64, [name, unit]: [&str; 2]) {
         let [left, top, _, height] = self.frame;
         let title = format!("{name} [{}]", self.y_ticks.unit(unit));
         let at = [left - offset, top + 0.5 * height];
-        svg.upright(at, &title, Type::new(LABEL, Anchor::Middle));
+        svg.upright(at, &title, TextStyle::new(LABEL, TextAnchor::Middle));
     }
 
     /// An empty frame that says why it is empty.
-    pub fn empty(svg: &mut Svg, frame: [f64; 4], reason: &str) {
+    pub fn empty(svg: &mut SvgPicture, frame: [f64; 4], reason: &str) {
         let [left, top, width, height] = frame;
-        svg.rect(frame, "none", Some(Stroke::solid(colour::FRAME, 0.9)));
+        svg.rect(frame, "none", Some(LineStroke::solid(colour::FRAME, 0.9)));
         let middle = [left + 0.5 * width, top + 0.5 * height + 4.0];
-        svg.text(middle, reason, Type::new(LABEL, Anchor::Middle).muted());
+        svg.text(
+            middle,
+            reason,
+            TextStyle::new(LABEL, TextAnchor::Middle).muted(),
+        );
     }
 }

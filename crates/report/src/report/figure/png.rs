@@ -62,13 +62,13 @@ pub fn png(svg: &str) -> Result<Vec<u8>, PngError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::svg::{Anchor, Stroke, Svg, Type};
+    use super::super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle};
     use super::*;
 
     /// Pixels of a text in a figure of 100 x 20 px that are not white.
     fn inked(text: &str, bold: bool) -> usize {
-        let mut svg = Svg::new(100.0, 20.0, "t", "");
-        let style = Type::new(12.0, Anchor::Start);
+        let mut svg = SvgPicture::new(100.0, 20.0, "t", "");
+        let style = TextStyle::new(12.0, TextAnchor::Start);
         let style = if bold { style.bold() } else { style };
         svg.text([2.0, 15.0], text, style);
         let picture = png(&svg.finish()).unwrap();
@@ -96,10 +96,10 @@ mod tests {
     #[test]
     fn the_same_figure_gives_the_same_bytes() {
         let draw = || {
-            let mut svg = Svg::new(80.0, 40.0, "a & b", "");
+            let mut svg = SvgPicture::new(80.0, 40.0, "a & b", "");
             svg.curve(
                 &[vec![[1.0, 2.0], [70.0, 30.0]]],
-                Stroke::dashed("#0072b2", 1.0, "4 3"),
+                LineStroke::dashed("#0072b2", 1.0, "4 3"),
             );
             png(&svg.finish()).unwrap()
         };

@@ -4,8 +4,8 @@ use super::axis;
 use super::colour;
 use super::decimate::decimated;
 use super::legend::{self, Key};
-use super::panel::Panel;
-use super::svg::{Stroke, Svg};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture};
 use crate::report::words::listed;
 
 /// One joint over time [rad].
@@ -40,10 +40,10 @@ const FOOT: f64 = 18.0;
 /// Points of a line.
 const POINTS: usize = 900;
 
-const COMMAND: Stroke = Stroke::dashed(colour::MUTED, 1.1, "2 3");
-const MEASURED: Stroke = Stroke::solid(colour::INK, 1.6);
-const GIVEN: Stroke = Stroke::dashed(colour::VERMILLION, 1.3, "6 3");
-const REFINED: Stroke = Stroke::solid(colour::SKY, 1.4);
+const COMMAND: LineStroke = LineStroke::dashed(colour::MUTED, 1.1, "2 3");
+const MEASURED: LineStroke = LineStroke::solid(colour::INK, 1.6);
+const GIVEN: LineStroke = LineStroke::dashed(colour::VERMILLION, 1.3, "6 3");
+const REFINED: LineStroke = LineStroke::solid(colour::SKY, 1.4);
 
 impl PositionFigure {
     /// The figure as an SVG document.
@@ -72,7 +72,7 @@ impl PositionFigure {
 }
 
 impl PositionPanel {
-    fn draw(&self, svg: &mut Svg, frame: [f64; 4], last: bool) {
+    fn draw(&self, svg: &mut SvgPicture, frame: [f64; 4], last: bool) {
         let [left, top, ..] = frame;
         svg.heading([left, top - 6.0], &self.joint, "");
         let lines = [
@@ -85,10 +85,10 @@ impl PositionPanel {
         let near = self.command.iter().chain(&self.measured).copied();
         let clock = axis::interval(self.t.iter().copied(), 0.0);
         let (Some(clock), Some(range)) = (clock, axis::interval(near, 0.25)) else {
-            Panel::empty(svg, frame, "no samples");
+            PlotPanel::empty(svg, frame, "no samples");
             return;
         };
-        let panel = Panel::new(frame, clock, range, [8, 6]);
+        let panel = PlotPanel::new(frame, clock, range, [8, 6]);
         panel.grid(svg);
         svg.clip(frame);
         for (values, stroke) in lines {

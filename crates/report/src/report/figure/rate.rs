@@ -3,8 +3,8 @@
 use super::colour;
 use super::joint_grid;
 use super::legend::Key;
-use super::panel::Panel;
-use super::svg::{Stroke, Svg, fitted};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture, fitted};
 
 /// Changes of one kind.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,11 +24,11 @@ pub struct RateFigure {
 }
 
 /// Distinguished by dashes as well as by colour.
-const STROKES: [Stroke; 4] = [
-    Stroke::dashed(colour::SKY, 1.6, "2 3"),
-    Stroke::solid(colour::BLUE, 1.8),
-    Stroke::dashed(colour::VERMILLION, 1.6, "7 3"),
-    Stroke::dashed(colour::INK, 1.4, "9 3 2 3"),
+const STROKES: [LineStroke; 4] = [
+    LineStroke::dashed(colour::SKY, 1.6, "2 3"),
+    LineStroke::solid(colour::BLUE, 1.8),
+    LineStroke::dashed(colour::VERMILLION, 1.6, "7 3"),
+    LineStroke::dashed(colour::INK, 1.4, "9 3 2 3"),
 ];
 
 impl RateFigure {
@@ -50,16 +50,16 @@ impl RateFigure {
 }
 
 impl RatePanel {
-    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+    fn draw(&self, svg: &mut SvgPicture, frame: [f64; 4]) {
         let [left, top, width, _] = frame;
         let name = fitted(&self.name, 11.5, width);
         svg.heading([left, top - 7.0], &name, "");
         let longest = self.lines.iter().map(Vec::len).max().unwrap_or_default();
         if longest < 2 {
-            Panel::empty(svg, frame, "no changes");
+            PlotPanel::empty(svg, frame, "no changes");
             return;
         }
-        let panel = Panel::new(frame, [0.0, (longest - 1) as f64], [0.0, 100.0], [5, 5]);
+        let panel = PlotPanel::new(frame, [0.0, (longest - 1) as f64], [0.0, 100.0], [5, 5]);
         panel.grid(svg);
         for (line, stroke) in self.lines.iter().zip(STROKES) {
             let points = line.iter().enumerate();

@@ -2,12 +2,12 @@
 //! over order and frequency.
 
 use super::axis;
-use super::cell::{self, Cells};
+use super::cell::{self, PictureGroup};
 use super::colour;
 use super::decimate::decimated;
 use super::legend::{self, Key};
-use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, width_of};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle, width_of};
 use crate::report::words::listed;
 use cft_ident_core::number;
 
@@ -19,14 +19,14 @@ pub struct ResidualPanel {
     /// Name and unit of the quantity at the left.
     pub of: (String, String),
     /// Lines of (x, y); a y that is not finite parts a line.
-    pub lines: Vec<(When, Vec<[f64; 2]>)>,
+    pub lines: Vec<(ResidualLine, Vec<[f64; 2]>)>,
     /// Places below that are marked, with their names.
     pub marks: Vec<(f64, String)>,
 }
 
 /// Which line it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
+pub enum ResidualLine {
     Before,
     /// Before, of backward motion.
     BeforeBackward,
@@ -52,13 +52,13 @@ const NUMBERS: f64 = 42.0;
 const COLUMNS: usize = 3;
 const POINTS: usize = 500;
 
-impl When {
-    fn stroke(self) -> Stroke {
+impl ResidualLine {
+    fn stroke(self) -> LineStroke {
         match self {
-            When::Before => Stroke::solid(colour::VERMILLION, 1.1),
-            When::BeforeBackward => Stroke::dashed(colour::VERMILLION, 1.1, "4 3"),
-            When::After => Stroke::solid(colour::BLUE, 1.4),
-            When::AfterBackward => Stroke::dashed(colour::BLUE, 1.4, "4 3"),
+            ResidualLine::Before => LineStroke::solid(colour::VERMILLION, 1.1),
+            ResidualLine::BeforeBackward => LineStroke::dashed(colour::VERMILLION, 1.1, "4 3"),
+            ResidualLine::After => LineStroke::solid(colour::BLUE, 1.4),
+            ResidualLine::AfterBackward => LineStroke::dashed(colour::BLUE, 1.4, "4 3"),
         }
     }
 }
@@ -96,7 +96,7 @@ impl ResidualFigure {
     }
 
     /// The panels as pictures of their own, joint by joint.
-    pub fn cells(&self) -> Vec<Cells> {
+    pub fn cells(&self) -> Vec<PictureGroup> {
         let entries = self.entries();
         let of_joint = |(name, panels): &(String, Vec<ResidualPanel>)| {
             let picture = |panel: &ResidualPanel| {
@@ -107,27 +107,27 @@ impl ResidualFigure {
                 })
             };
             let title = format!("{}, {name}", self.title);
-            Cells::new(&title, &entries, panels.iter().map(picture))
+            PictureGroup::new(&title, &entries, panels.iter().map(picture))
         };
         self.joints.iter().map(of_joint).collect()
     }
 
     /// The legend of all that is drawn; a residual that nothing came after is not `before`.
     fn entries(&self) -> Vec<(Key, &'static str)> {
-        let drawn = |when: When| {
+        let drawn = |when: ResidualLine| {
             let mut panels = self.joints.iter().flat_map(|(_, panels)| panels);
             panels.any(|panel| panel.lines.iter().any(|(w, _)| *w == when))
         };
-        let alone = !drawn(When::After) && !drawn(When::AfterBackward);
+        let alone = !drawn(ResidualLine::After) && !drawn(ResidualLine::AfterBackward);
         let [before, backward] = match alone {
             true => ["residual", "residual, backward"],
             false => ["before", "before, backward"],
         };
         let names = [
-            (When::Before, before),
-            (When::BeforeBackward, backward),
-            (When::After, "after"),
-            (When::AfterBackward, "after, backward"),
+            (ResidualLine::Before, before),
+            (ResidualLine::BeforeBackward, backward),
+            (ResidualLine::After, "after"),
+            (ResidualLine::AfterBackward, "after, backward"),
         ];
         let there = names.into_iter().filter(|(when, _)| drawn(*when));
         let entries = there.map(|(when, name)| (Key::Line(when.stroke()), name));
@@ -138,14 +138,14 @@ impl ResidualFigure {
 impl ResidualPanel {
     /// The greatest of each line, for a screen reader.
     fn words(&self, joint: &str) -> String {
-        let most = |wanted: [When; 2]| {
+        let most = |wanted: [ResidualLine; 2]| {
             let lines = self.lines.iter().filter(|(when, _)| wanted.contains(when));
             let values = lines.flat_map(|(_, line)| line.iter().map(|p| p[1].abs()));
             values.filter(|y| y.is_finite()).reduce(f64::max)
         };
         let shown = |x: f64| format!("{} {}", number::significant(x, 3), self.of.1);
-        let before = most([When::Before, When::BeforeBackward]);
-        let after = most([When::After, When::AfterBackward]);
+        let before = most([ResidualLine::Before, ResidualLine::BeforeBackward]);
+        let after = most([ResidualLine::After, ResidualLine::AfterBackward]);
         let (what, over) = (&self.of.0, &self.over.0);
         match (before, after) {
             (Some(before), Some(after)) => format!(
@@ -160,16 +160,16 @@ impl ResidualPanel {
         }
     }
 
-    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+    fn draw(&self, svg: &mut SvgPicture, frame: [f64; 4]) {
         let points = || self.lines.iter().flat_map(|(_, line)| line);
         let finite = |v: &f64| v.is_finite();
         let x = axis::interval(points().map(|p| p[0]).filter(finite), 0.0);
         let y = axis::interval(points().map(|p| p[1]).filter(finite), 0.06);
         let (Some(x), Some(y)) = (x, y) else {
-            Panel::empty(svg, frame, "not enough motion");
+            PlotPanel::empty(svg, frame, "not enough motion");
             return;
         };
-        let panel = Panel::new(frame, x, y, [4, 4]);
+        let panel = PlotPanel::new(frame, x, y, [4, 4]);
         panel.grid(svg);
         svg.clip(frame);
         for (when, line) in &self.lines {
@@ -185,7 +185,7 @@ impl ResidualPanel {
     }
 
     /// Marks, with their names above the frame where these do not meet.
-    fn mark(&self, svg: &mut Svg, panel: &Panel) {
+    fn mark(&self, svg: &mut SvgPicture, panel: &PlotPanel) {
         let [_, top, _, height] = panel.frame;
         let mut marks: Vec<&(f64, String)> = self.marks.iter().collect();
         marks.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -193,11 +193,15 @@ impl ResidualPanel {
         let [from, to] = panel.x.data;
         for (x, name) in marks.into_iter().filter(|(x, _)| (from..=to).contains(x)) {
             let at = panel.x.px(*x);
-            let line = Stroke::dashed(colour::INK, 0.9, "2 2");
+            let line = LineStroke::dashed(colour::INK, 0.9, "2 2");
             svg.line([at, top], [at, top + height], line);
             let half = 0.5 * width_of(name, 10.0) + 2.0;
             if at - half > free {
-                svg.text([at, top - 3.0], name, Type::new(10.0, Anchor::Middle));
+                svg.text(
+                    [at, top - 3.0],
+                    name,
+                    TextStyle::new(10.0, TextAnchor::Middle),
+                );
                 free = at + half;
             }
         }
@@ -213,7 +217,10 @@ mod tests {
         let panel = |line: Vec<[f64; 2]>| ResidualPanel {
             over: ("velocity".into(), "rad/s".into()),
             of: ("residual".into(), "Nm".into()),
-            lines: vec![(When::Before, line.clone()), (When::AfterBackward, line)],
+            lines: vec![
+                (ResidualLine::Before, line.clone()),
+                (ResidualLine::AfterBackward, line),
+            ],
             marks: vec![(1.0, "1.00".into()), (9.0, "9.00".into())],
         };
         let panels = vec![

@@ -1,10 +1,10 @@
 //! A robot in motion, from the side and from above: its joints on the chain, coloured by their errors.
 
-use super::axis::Scale;
-use super::cell::{self, Cells};
+use super::axis::AxisScale;
+use super::cell::{self, PictureGroup};
 use super::colour;
 use super::legend::Key;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use super::svg::{LineStroke, SvgPicture, TextAnchor, TextStyle, fitted};
 use cft_ident_core::number;
 
 /// One joint of the sketch.
@@ -17,7 +17,7 @@ pub(crate) struct SketchJoint {
 }
 
 /// Poses of a tree of links, in a frame whose third axis points upwards.
-pub(crate) struct Sketch {
+pub(crate) struct PoseSketch {
     pub title: String,
     pub joints: Vec<SketchJoint>,
     /// Points that each point of a pose is joined with; none for the base.
@@ -33,10 +33,10 @@ const HEIGHT: f64 = 230.0;
 const NAMES: f64 = 96.0;
 /// Distance of two names [px].
 const NAME_DISTANCE_PX: f64 = 14.0;
-const LINK: Stroke = Stroke::solid(colour::INK, 3.0);
-const EARLIER: Stroke = Stroke::solid(colour::ZERO, 1.4);
-const WAY: Stroke = Stroke::dashed(colour::MUTED, 0.9, "3 2");
-const LEADER: Stroke = Stroke::solid(colour::FRAME, 0.6);
+const LINK: LineStroke = LineStroke::solid(colour::INK, 3.0);
+const EARLIER: LineStroke = LineStroke::solid(colour::ZERO, 1.4);
+const WAY: LineStroke = LineStroke::dashed(colour::MUTED, 0.9, "3 2");
+const LEADER: LineStroke = LineStroke::solid(colour::FRAME, 0.6);
 
 /// Classes of errors, the same on every page: below which error, colour, and name.
 const CLASSES: [(f64, &str, &str); 5] = [
@@ -47,9 +47,9 @@ const CLASSES: [(f64, &str, &str); 5] = [
     (f64::INFINITY, colour::PURPLE, "above 30 %"),
 ];
 
-impl Sketch {
+impl PoseSketch {
     /// From the side and from above, to one scale.
-    pub fn cells(&self) -> Cells {
+    pub fn cells(&self) -> PictureGroup {
         let views = [("side view", [0, 2]), ("top view", [0, 1])];
         let picture = |(name, axes): (&str, [usize; 2])| {
             cell::cell(name, &self.words(), HEIGHT, |svg, frame| {
@@ -63,7 +63,7 @@ impl Sketch {
             (Key::Line(WAY), "path of the last joint"),
         ];
         let key: Vec<(Key, &str)> = classes.into_iter().chain(lines).collect();
-        Cells::new(&self.title, &key, views.into_iter().map(picture))
+        PictureGroup::new(&self.title, &key, views.into_iter().map(picture))
     }
 
     /// The joint of the largest error, for a screen reader.
@@ -80,7 +80,7 @@ impl Sketch {
         format!("The robot along its motion{}", worst.unwrap_or_default())
     }
 
-    fn draw(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4], axes: [usize; 2]) {
+    fn draw(&self, svg: &mut SvgPicture, [left, top, width, height]: [f64; 4], axes: [usize; 2]) {
         let flat = |point: &[f64; 3]| [point[axes[0]], point[axes[1]]];
         let all = || self.poses.iter().flatten().chain(&self.way).map(flat);
         let room = [width - NAMES, height];
@@ -99,8 +99,8 @@ impl Sketch {
             let (middle, half) = (0.5 * (from + to), 0.5 * metres * room);
             [middle - half, middle + half]
         };
-        let x = Scale::new(around(across, room[0]), left, left + room[0]);
-        let y = Scale::new(around(up, room[1]), top + height, top);
+        let x = AxisScale::new(around(across, room[0]), left, left + room[0]);
+        let y = AxisScale::new(around(up, room[1]), top + height, top);
         let px = |point: &[f64; 3]| {
             let [a, b] = flat(point);
             [x.px(a), y.px(b)]
@@ -125,7 +125,7 @@ impl Sketch {
     /// The joints and their names, each joined with its own.
     fn named(
         &self,
-        svg: &mut Svg,
+        svg: &mut SvgPicture,
         px: &dyn Fn(&[f64; 3]) -> [f64; 2],
         pose: &[[f64; 3]],
         [left, top, height]: [f64; 3],
@@ -145,7 +145,7 @@ impl Sketch {
             svg.line(*at, [left - 3.0, line - 3.5], LEADER);
         }
         for (joint, at) in &places {
-            let ring = Stroke::solid(colour::PAPER, 1.2);
+            let ring = LineStroke::solid(colour::PAPER, 1.2);
             svg.ringed(*at, 5.0, fill(joint.error), ring);
         }
         for ((joint, _), line) in places.iter().zip(&lines) {
@@ -154,7 +154,11 @@ impl Sketch {
                 false => joint.name.clone(),
             };
             let text = fitted(&text, 10.5, NAMES - 12.0);
-            svg.text([left, *line], &text, Type::new(10.5, Anchor::Start));
+            svg.text(
+                [left, *line],
+                &text,
+                TextStyle::new(10.5, TextAnchor::Start),
+            );
         }
     }
 }
@@ -166,20 +170,20 @@ fn fill(error: f64) -> &'static str {
 }
 
 /// A round length below the picture.
-fn scale_bar(svg: &mut Svg, [left, top]: [f64; 2], metres: f64, width: f64) {
+fn scale_bar(svg: &mut SvgPicture, [left, top]: [f64; 2], metres: f64, width: f64) {
     let most = 0.4 * width * metres;
     let decade = 10f64.powf(most.log10().floor());
     let fits = |x: &f64| x * decade <= most;
     let factor = [5.0, 2.0, 1.0].into_iter().find(fits).unwrap_or(1.0);
     let length = factor * decade;
     let end = left + length / metres;
-    let bar = Stroke::solid(colour::INK, 1.4);
+    let bar = LineStroke::solid(colour::INK, 1.4);
     svg.line([left, top], [end, top], bar);
     for x in [left, end] {
         svg.line([x, top - 3.0], [x, top + 3.0], bar);
     }
     let text = format!("{} m", number::significant(length, 1));
-    let style = Type::new(10.5, Anchor::Start);
+    let style = TextStyle::new(10.5, TextAnchor::Start);
     svg.text([end + 6.0, top + 3.5], &text, style);
 }
 
@@ -187,13 +191,13 @@ fn scale_bar(svg: &mut Svg, [left, top]: [f64; 2], metres: f64, width: f64) {
 mod tests {
     use super::*;
 
-    fn sketch(errors: [f64; 3]) -> Sketch {
+    fn sketch(errors: [f64; 3]) -> PoseSketch {
         let joint = |(point, error): (usize, f64)| SketchJoint {
             name: format!("q{}", point + 1),
             error,
             point,
         };
-        Sketch {
+        PoseSketch {
             title: "the robot".into(),
             joints: errors.into_iter().enumerate().map(joint).collect(),
             parents: vec![None, Some(0), Some(1)],

@@ -11,20 +11,20 @@ const FONTS: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-se
 
 /// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stroke {
+pub(super) struct LineStroke {
     pub colour: &'static str,
     pub width: f64,
     /// Lengths of dash and gap as SVG wants them; empty for a solid line.
     pub dash: &'static str,
 }
 
-impl Stroke {
+impl LineStroke {
     pub(crate) const fn solid(colour: &'static str, width: f64) -> Self {
-        Stroke::dashed(colour, width, "")
+        LineStroke::dashed(colour, width, "")
     }
 
     pub(crate) const fn dashed(colour: &'static str, width: f64, dash: &'static str) -> Self {
-        Stroke {
+        LineStroke {
             colour,
             width,
             dash,
@@ -34,7 +34,7 @@ impl Stroke {
 
 /// Where a text is anchored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Anchor {
+pub(super) enum TextAnchor {
     Start,
     Middle,
     End,
@@ -42,16 +42,16 @@ pub(super) enum Anchor {
 
 /// How a text is set.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Type {
+pub(super) struct TextStyle {
     pub size: f64,
     pub bold: bool,
     pub colour: &'static str,
-    pub anchor: Anchor,
+    pub anchor: TextAnchor,
 }
 
-impl Type {
-    pub const fn new(size: f64, anchor: Anchor) -> Self {
-        Type {
+impl TextStyle {
+    pub const fn new(size: f64, anchor: TextAnchor) -> Self {
+        TextStyle {
             size,
             bold: false,
             colour: colour::INK,
@@ -72,7 +72,7 @@ impl Type {
 
 /// A picture under construction; y grows downwards, units are px.
 #[derive(Debug)]
-pub(super) struct Svg {
+pub(super) struct SvgPicture {
     width: f64,
     height: f64,
     title: String,
@@ -80,10 +80,10 @@ pub(super) struct Svg {
     body: String,
 }
 
-impl Svg {
+impl SvgPicture {
     /// A screen reader says `title` and `description`.
     pub fn new(width: f64, height: f64, title: &str, description: &str) -> Self {
-        Svg {
+        SvgPicture {
             width,
             height,
             title: escaped(title),
@@ -92,19 +92,19 @@ impl Svg {
         }
     }
 
-    pub(crate) fn rect(&mut self, frame: [f64; 4], fill: &str, stroke: Option<Stroke>) {
+    pub(crate) fn rect(&mut self, frame: [f64; 4], fill: &str, stroke: Option<LineStroke>) {
         let [x, y, width, height] = frame.map(px);
         let rect = format!("rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");
         self.shape(&format!("{rect} fill=\"{fill}\""), stroke);
     }
 
-    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: Stroke) {
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], stroke: LineStroke) {
         let path = steps(&[from, to]);
         self.shape(&format!("path d=\"{path}\" fill=\"none\""), Some(stroke));
     }
 
     /// Several runs of points as one path, so that one dash pattern and one colour hold for them.
-    pub fn curve(&mut self, runs: &[Vec<[f64; 2]>], stroke: Stroke) {
+    pub fn curve(&mut self, runs: &[Vec<[f64; 2]>], stroke: LineStroke) {
         let runs = runs.iter().filter(|run| run.len() > 1);
         let path: String = runs.map(|run| steps(run)).collect();
         if !path.is_empty() {
@@ -127,33 +127,33 @@ impl Svg {
     }
 
     /// A dot with a ring around it.
-    pub(crate) fn ringed(&mut self, at: [f64; 2], radius: f64, fill: &str, ring: Stroke) {
+    pub(crate) fn ringed(&mut self, at: [f64; 2], radius: f64, fill: &str, ring: LineStroke) {
         self.circle(at, radius, fill, Some(ring));
     }
 
-    fn circle(&mut self, [x, y]: [f64; 2], radius: f64, fill: &str, ring: Option<Stroke>) {
+    fn circle(&mut self, [x, y]: [f64; 2], radius: f64, fill: &str, ring: Option<LineStroke>) {
         let [x, y, radius] = [x, y, radius].map(px);
         let circle = format!("circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{fill}\"");
         self.shape(&circle, ring);
     }
 
-    pub fn text(&mut self, [x, y]: [f64; 2], text: &str, style: Type) {
+    pub fn text(&mut self, [x, y]: [f64; 2], text: &str, style: TextStyle) {
         self.set(&format!("x=\"{}\" y=\"{}\"", px(x), px(y)), "", text, style);
     }
 
     /// The line above a panel: a bold name, and more about it.
     pub fn heading(&mut self, [x, y]: [f64; 2], name: &str, rest: &str) {
         let place = format!("x=\"{}\" y=\"{}\"", px(x), px(y));
-        self.set(&place, name, rest, Type::new(11.5, Anchor::Start));
+        self.set(&place, name, rest, TextStyle::new(11.5, TextAnchor::Start));
     }
 
     /// Text that reads upwards, anchored at its middle.
-    pub fn upright(&mut self, [x, y]: [f64; 2], text: &str, style: Type) {
+    pub fn upright(&mut self, [x, y]: [f64; 2], text: &str, style: TextStyle) {
         let place = format!("transform=\"translate({} {}) rotate(-90)\"", px(x), px(y));
         self.set(&place, "", text, style);
     }
 
-    /// Begins a group that is cut at a rectangle, until [`Svg::end_clip`]; a nested picture needs no id in the page.
+    /// Begins a group that is cut at a rectangle, until [`SvgPicture::end_clip`]; a nested picture needs no id in the page.
     pub(crate) fn clip(&mut self, frame: [f64; 4]) {
         let [x, y, width, height] = frame.map(px);
         let _ = writeln!(
@@ -183,9 +183,9 @@ impl Svg {
     }
 
     /// An element by its name and attributes.
-    fn shape(&mut self, element: &str, stroke: Option<Stroke>) {
+    fn shape(&mut self, element: &str, stroke: Option<LineStroke>) {
         let _ = write!(self.body, "<{element}");
-        if let Some(Stroke {
+        if let Some(LineStroke {
             colour,
             width,
             dash,
@@ -200,11 +200,11 @@ impl Svg {
         self.body.push_str("/>\n");
     }
 
-    fn set(&mut self, place: &str, bold: &str, text: &str, style: Type) {
+    fn set(&mut self, place: &str, bold: &str, text: &str, style: TextStyle) {
         let anchor = match style.anchor {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
+            TextAnchor::Start => "start",
+            TextAnchor::Middle => "middle",
+            TextAnchor::End => "end",
         };
         let weight = if style.bold {
             " font-weight=\"bold\""
@@ -298,8 +298,12 @@ mod tests {
 
     #[test]
     fn names_from_a_file_cannot_write_markup() {
-        let mut svg = Svg::new(10.0, 10.0, "a & b", "");
-        svg.text([1.0, 2.0], "<script>\u{7}", Type::new(10.0, Anchor::Start));
+        let mut svg = SvgPicture::new(10.0, 10.0, "a & b", "");
+        svg.text(
+            [1.0, 2.0],
+            "<script>\u{7}",
+            TextStyle::new(10.0, TextAnchor::Start),
+        );
         let text = svg.finish();
         assert!(text.contains("<title>a &amp; b</title>"));
         assert!(text.contains("&lt;script&gt;</text>"));

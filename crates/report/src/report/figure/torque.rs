@@ -5,8 +5,8 @@ use super::axis;
 use super::colour;
 use super::decimate::{POINTS, decimated};
 use super::legend::{self, Key};
-use super::panel::Panel;
-use super::svg::{Stroke, Svg};
+use super::panel::PlotPanel;
+use super::svg::{LineStroke, SvgPicture};
 use crate::report::words::{listed, torque_or_force};
 use cft_ident_core::number;
 
@@ -58,9 +58,9 @@ const RESIDUAL: f64 = 68.0;
 const NUMBERS: f64 = 30.0;
 const FOOT: f64 = 16.0;
 
-const MEASURED: Stroke = Stroke::dashed(colour::INK, 1.0, "5 4");
-const RECONSTRUCTED: Stroke = Stroke::solid(colour::SKY, 2.4);
-const DIFFERENCE: Stroke = Stroke::solid(colour::VERMILLION, 0.9);
+const MEASURED: LineStroke = LineStroke::dashed(colour::INK, 1.0, "5 4");
+const RECONSTRUCTED: LineStroke = LineStroke::solid(colour::SKY, 2.4);
+const DIFFERENCE: LineStroke = LineStroke::solid(colour::VERMILLION, 0.9);
 
 impl TorqueFigure {
     /// A picture for each joint, one SVG document after the other: paper parts them where it must.
@@ -90,7 +90,7 @@ impl TorqueFigure {
         let entries = entries.map(|(stroke, name)| (Key::Line(stroke), name));
         let titles = [&*self.title, &description];
         let mut svg = legend::headed([WIDTH, height], [LEFT, RIGHT], titles, &entries);
-        let clock = Clock::of(&self.joints);
+        let clock = TimeAxis::of(&self.joints);
         for (k, joint) in self.joints.iter().enumerate() {
             let top = HEAD + group * k as f64;
             joint.draw(&mut svg, top, clock.as_ref(), k + 1 == self.joints.len());
@@ -100,20 +100,20 @@ impl TorqueFigure {
 }
 
 /// The axis of time that the joints share.
-struct Clock {
+struct TimeAxis {
     /// From and to, after `start` [s].
     interval: [f64; 2],
     /// 0, or a whole second where the log's clock does not begin near 0 [s].
     start: f64,
 }
 
-impl Clock {
+impl TimeAxis {
     fn of(joints: &[JointTorque]) -> Option<Self> {
         let times = joints.iter().flat_map(|joint| joint.t.iter().copied());
         let [from, to] = axis::interval(times, 0.0)?;
         let late = from.abs() > 100.0 * (to - from);
         let start = if late { from.floor() } else { 0.0 };
-        Some(Clock {
+        Some(TimeAxis {
             interval: [from - start, to - start],
             start,
         })
@@ -128,7 +128,7 @@ impl Clock {
 }
 
 impl JointTorque {
-    fn draw(&self, svg: &mut Svg, top: f64, clock: Option<&Clock>, last: bool) {
+    fn draw(&self, svg: &mut SvgPicture, top: f64, clock: Option<&TimeAxis>, last: bool) {
         svg.heading([LEFT, top + 13.0], &self.joint, &self.figures());
         let width = WIDTH - LEFT - RIGHT;
         let upper = [LEFT, top + NAME, width, TORQUE];
@@ -139,11 +139,11 @@ impl JointTorque {
         let range = axis::interval(both, 0.06);
         let spread = axis::interval(residual.iter().flat_map(|&r| [r, -r]), 0.08);
         let (Some(clock), Some(range), Some(spread)) = (clock, range, spread) else {
-            Panel::empty(svg, upper, "no samples");
-            Panel::empty(svg, lower, "no samples");
+            PlotPanel::empty(svg, upper, "no samples");
+            PlotPanel::empty(svg, lower, "no samples");
             return;
         };
-        let panel = Panel::new(upper, clock.interval, range, [9, 5]);
+        let panel = PlotPanel::new(upper, clock.interval, range, [9, 5]);
         panel.grid(svg);
         svg.clip(upper);
         let t: Vec<f64> = self.t.iter().map(|t| t - clock.start).collect();
@@ -153,7 +153,7 @@ impl JointTorque {
         svg.end_clip();
         panel.outline(svg);
         panel.y_title(svg, 52.0, [torque_or_force(&self.unit), &self.unit]);
-        let panel = Panel::new(lower, clock.interval, spread, [9, 3]);
+        let panel = PlotPanel::new(lower, clock.interval, spread, [9, 3]);
         panel.grid(svg);
         svg.clip(lower);
         svg.curve(&panel.place(line(&residual)), DIFFERENCE);

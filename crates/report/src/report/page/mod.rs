@@ -1,14 +1,16 @@
 //! One self-contained page: headings, paragraphs, tables and figures in one HTML file that opens
 //! from disk, on paper and on a phone, in light and in dark, without a network.
 //!
-//! Pictures are SVG and are seen without a script. Where a script runs, [`Part::Traces`] take the place
+//! Pictures are SVG and are seen without a script. Where a script runs, [`ReportPart::Traces`] take the place
 //! of their still picture and can be zoomed. The page's policy allows that one script, by its checksum,
 //! and nothing from anywhere else.
 
 use super::encode;
-use super::figure::Cells;
+use super::figure::PictureGroup;
 use super::table::Table;
-use super::value::{Figure, FoundLine, Headline, Part, Report, Shown, Tone};
+use super::value::{
+    FigureTone, FoundLine, PartVisibility, Report, ReportPart, VerdictFigure, VerdictHeadline,
+};
 use cft_ident_logs::log::{Provenance, is_hidden};
 
 const STYLE: &str = include_str!("style.css");
@@ -19,12 +21,12 @@ impl Report {
     pub fn html(&self) -> String {
         let (mut opening, mut sections) = (String::new(), Vec::<(String, String)>::new());
         let mut scripted = false;
-        for part in self.parts(&[Shown::Page]) {
-            if let Part::Heading(text) = part {
+        for part in self.parts(&[PartVisibility::Page]) {
+            if let ReportPart::Heading(text) = part {
                 sections.push((escaped(text), String::new()));
                 continue;
             }
-            scripted |= matches!(part, Part::Traces { .. });
+            scripted |= matches!(part, ReportPart::Traces { .. });
             let body = sections.last_mut().map_or(&mut opening, |(_, body)| body);
             body.push_str(&shown(part));
         }
@@ -56,10 +58,10 @@ impl Report {
 }
 
 /// A part as markup, with a line end.
-fn shown(part: &Part) -> String {
+fn shown(part: &ReportPart) -> String {
     match part {
-        Part::Headline(headline) => headline_of(headline),
-        Part::Found(findings) => {
+        ReportPart::Headline(headline) => headline_of(headline),
+        ReportPart::Found(findings) => {
             let item = |f: &FoundLine| {
                 let class = f.grade.split(' ').next().unwrap_or_default();
                 format!(
@@ -72,7 +74,7 @@ fn shown(part: &Part) -> String {
             let items: String = findings.iter().map(item).collect();
             format!("<ul class=\"found\">\n{items}</ul>\n")
         }
-        Part::Next { text, command } => {
+        ReportPart::Next { text, command } => {
             let command = command
                 .as_ref()
                 .map(|c| format!("<pre>{}</pre>\n", whole_words(c)));
@@ -82,38 +84,38 @@ fn shown(part: &Part) -> String {
                 command.unwrap_or_default()
             )
         }
-        Part::Verdict { text, good } => {
+        ReportPart::Verdict { text, good } => {
             let class = if *good { "verdict" } else { "verdict bad" };
             format!("<p class=\"{class}\">{}</p>\n", prose(text))
         }
-        Part::Heading(_) => String::new(),
-        Part::Paragraph(text) | Part::Line(text) => format!("<p>{}</p>\n", prose(text)),
-        Part::Note { head, text, .. } => {
+        ReportPart::Heading(_) => String::new(),
+        ReportPart::Paragraph(text) | ReportPart::Line(text) => format!("<p>{}</p>\n", prose(text)),
+        ReportPart::Note { head, text, .. } => {
             format!("<p>{}{}</p>\n", escaped(head.trim_start()), prose(text))
         }
-        Part::List(items) => {
+        ReportPart::List(items) => {
             let item = |item: &String| format!("<li>{}</li>\n", prose(item));
             let items: String = items.iter().map(item).collect();
             format!("<ul>\n{items}</ul>\n")
         }
-        Part::Table(table) => table_of(table),
-        Part::Figure(svg) => {
+        ReportPart::Table(table) => table_of(table),
+        ReportPart::Figure(svg) => {
             let svg = inline(svg);
             format!("<figure><div class=\"still\">{svg}</div></figure>\n")
         }
-        Part::Figures(cells) => figures(cells),
-        Part::Folded { summary, cells } => format!(
+        ReportPart::Figures(cells) => figures(cells),
+        ReportPart::Folded { summary, cells } => format!(
             "<details class=\"table\"><summary>{}</summary>{}</details>\n",
             escaped(summary),
             figures(cells)
         ),
-        Part::Traces { data, still } => format!(
+        ReportPart::Traces { data, still } => format!(
             "<figure class=\"series\"><div class=\"still\">{}</div>\
              <script type=\"application/json\" class=\"traces\">{data}</script></figure>\n",
             inline(still)
         ),
-        Part::Code(text) => format!("<pre>{}</pre>\n", whole_words(text)),
-        Part::Details { summary, text } => format!(
+        ReportPart::Code(text) => format!("<pre>{}</pre>\n", whole_words(text)),
+        ReportPart::Details { summary, text } => format!(
             "<details><summary>{}</summary><pre>{}</pre></details>\n",
             escaped(summary),
             escaped(text)
@@ -122,10 +124,10 @@ fn shown(part: &Part) -> String {
 }
 
 /// The figures of a verdict beside each other, and of what they are.
-fn headline_of(headline: &Headline) -> String {
-    let figure = |f: &Figure| {
+fn headline_of(headline: &VerdictHeadline) -> String {
+    let figure = |f: &VerdictFigure| {
         let word = match f.tone {
-            Tone::Plain => String::new(),
+            FigureTone::Plain => String::new(),
             tone => format!(" <em>{}</em>", tone.word()),
         };
         format!(
@@ -143,7 +145,7 @@ fn headline_of(headline: &Headline) -> String {
 }
 
 /// Small pictures beside each other, with their title, their legend and the sentences below them.
-fn figures(cells: &Cells) -> String {
+fn figures(cells: &PictureGroup) -> String {
     let class = match (cells.apart, cells.pictures.len() > 2) {
         (true, _) => "card apart",
         (false, true) => "card many",
@@ -303,7 +305,7 @@ fn escaped(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::report::table::Columns;
-    use crate::report::traces::Traces;
+    use crate::report::traces::FigureTraces;
 
     #[test]
     fn nothing_that_is_given_becomes_markup() {
@@ -318,7 +320,7 @@ mod tests {
         page.list([evil]);
         page.details(evil, evil);
         page.table(Columns::new(evil, [()]).words(evil, |()| evil));
-        page.traces(&Traces::sample(evil), "<svg></svg>".to_owned());
+        page.traces(&FigureTraces::sample(evil), "<svg></svg>".to_owned());
         let html = report.html();
         // the data of the traces and the viewer
         assert_eq!(html.matches("<script").count(), 2);
@@ -339,7 +341,7 @@ mod tests {
     fn the_page_asks_for_nothing_from_anywhere() {
         let mut report = Report::new("t");
         let mut page = report.page();
-        page.traces(&Traces::sample("q1"), "<svg></svg>".to_owned());
+        page.traces(&FigureTraces::sample("q1"), "<svg></svg>".to_owned());
         let html = report.html();
         for word in [
             "http:", "https:", "src=", "@import", "url(", "fetch(", "import(",

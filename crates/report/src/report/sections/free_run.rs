@@ -1,6 +1,6 @@
 //! The motion that a model makes of measured torques.
 
-use crate::report::table::{Align, Columns};
+use crate::report::table::{CellAlignment, Columns};
 use crate::report::{Writer, words};
 use cft_ident_core::number;
 use cft_ident_stages::open_loop::{FreeRun, PositionErrorChange};
@@ -29,7 +29,7 @@ pub fn section(writer: &mut Writer, found: Option<&FreeRun>) {
         table = table
             .numbers("as given", |j| shown(Some(j.given.rms)))
             .numbers("after", |j| shown(j.after.as_ref().map(|after| after.rms)))
-            .column(Align::Right, "95 % CI of the change", |j| {
+            .column(CellAlignment::Right, "95 % CI of the change", |j| {
                 j.change.as_ref().map_or(number::ABSENT.into(), interval)
             })
             .words("unit", |j| j.unit)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::report::Writer;
 use crate::report::figure::{IntervalFigure, IntervalRow};
-use crate::report::table::{Align, Columns, Table};
+use crate::report::table::{CellAlignment, Columns, Table};
 use crate::report::words::{first_of, of_joint};
 use cft_ident_core::number;
 use cft_ident_core::robot::standard::STANDARD;
@@ -16,7 +16,7 @@ use cft_ident_files::config::model_file::Parameter;
 const INTERVAL_95: f64 = 1.96;
 
 /// The true value of a parameter, where it is known.
-type Truth<'a> = &'a dyn Fn(&Parameter) -> Option<f64>;
+type TrueValue<'a> = &'a dyn Fn(&Parameter) -> Option<f64>;
 
 fn is_open(p: &Parameter) -> bool {
     p.verdict == Some(Verdict::NotIdentifiable)
@@ -71,7 +71,7 @@ fn joint(p: &Parameter) -> &str {
 }
 
 /// Every parameter for a terminal, beside its truth; columns without an entry are left out.
-pub fn beside_truth(all: &[Parameter], truth: Truth) -> Table {
+pub fn beside_truth(all: &[Parameter], truth: TrueValue) -> Table {
     let any = |has: &dyn Fn(&Parameter) -> bool| all.iter().any(has);
     let known = |p: &Parameter, x: f64| if is_open(p) { f64::NAN } else { x };
     let std = |p: &Parameter| known(p, p.std.unwrap_or(f64::NAN));
@@ -82,7 +82,7 @@ pub fn beside_truth(all: &[Parameter], truth: Truth) -> Table {
         .when(any(&|p| p.joint.is_some()), |t| t.words("joint", joint))
         .words("parameter", |p| &p.name)
         .when(any(&|p| p.theta.is_some()), |t| {
-            t.column(Align::Right, "theta", theta)
+            t.column(CellAlignment::Right, "theta", theta)
         })
         .estimates(["value", "std"], |p| (known(p, p.value), std(p)))
         .when(any(&|p| truth(p).is_some()), |t| {
@@ -95,7 +95,7 @@ pub fn beside_truth(all: &[Parameter], truth: Truth) -> Table {
 }
 
 /// The section of a page.
-pub fn section(page: &mut Writer, model: &ModelFile, truth: Truth) {
+pub fn section(page: &mut Writer, model: &ModelFile, truth: TrueValue) {
     page.heading("Parameters");
     intervals(page, model);
     let all = &model.parameters;

@@ -2,7 +2,7 @@
 
 use crate::report::Writer;
 use crate::report::table::Columns;
-use cft_ident_logs::inspect::{Findings, Severity};
+use cft_ident_logs::inspect::{LogFindings, Severity};
 use cft_ident_logs::log::escape;
 
 /// Faults that are reported; a log with more of them has one cause.
@@ -35,14 +35,14 @@ fn also(cell: &mut String, entry: &str) {
 }
 
 /// A log as it was found, or why it could not be inspected.
-pub struct Inspected {
+pub struct InspectedLog {
     /// Name of the log.
     pub name: String,
-    pub found: Result<Findings, String>,
+    pub found: Result<LogFindings, String>,
 }
 
 /// The section: every log once, and its faults, the worst first.
-pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
+pub fn section(page: &mut Writer, logs: &[InspectedLog], warnings: &[String]) {
     page.heading("Data quality");
     let (mut inspected, mut faults) = (Vec::new(), Vec::<Vec<String>>::new());
     let mut hidden = 0;
@@ -77,7 +77,7 @@ pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
             }
         }
     }
-    let count = |found: &Findings, severity| found.of(severity).count().to_string();
+    let count = |found: &LogFindings, severity| found.of(severity).count().to_string();
     let columns = Columns::new("logs", &inspected)
         .words("log", |(name, _)| name)
         .words("rows", |(_, of)| of.rows.to_string())

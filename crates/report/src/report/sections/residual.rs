@@ -1,7 +1,7 @@
 //! The residual over position, velocity, load and time, and its spectra.
 
 use crate::report::Writer;
-use crate::report::figure::{ResidualFigure, ResidualPanel, When};
+use crate::report::figure::{ResidualFigure, ResidualLine, ResidualPanel};
 use crate::report::words::{first_of, torque_or_force};
 use cft_ident_core::diagnose::JointEvidence;
 use cft_ident_core::number;
@@ -46,20 +46,26 @@ fn panels(
     let wave = if position == "m" { "1/m" } else { "1/rev" };
     let load = format!("load {}", torque_or_force(torque));
     let one = |get: fn(&JointEvidence) -> &Vec<[f64; 2]>| {
-        let mut lines = vec![(When::Before, get(&of.before).clone())];
+        let mut lines = vec![(ResidualLine::Before, get(&of.before).clone())];
         lines.extend(
             of.after
                 .as_ref()
-                .map(|after| (When::After, get(after).clone())),
+                .map(|after| (ResidualLine::After, get(after).clone())),
         );
         lines
     };
     let two = |get: fn(&JointEvidence) -> &[Vec<[f64; 2]>; 2]| {
         let [forward, backward] = get(&of.before).clone();
-        let mut lines = vec![(When::Before, forward), (When::BeforeBackward, backward)];
+        let mut lines = vec![
+            (ResidualLine::Before, forward),
+            (ResidualLine::BeforeBackward, backward),
+        ];
         if let Some(after) = &of.after {
             let [forward, backward] = get(after).clone();
-            lines.extend([(When::After, forward), (When::AfterBackward, backward)]);
+            lines.extend([
+                (ResidualLine::After, forward),
+                (ResidualLine::AfterBackward, backward),
+            ]);
         }
         lines
     };

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::report::Writer;
 use crate::report::figure::{JointTorque, TorqueFigure, parted};
-use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
+use crate::report::traces::{FigureTraces, LogTrace, TraceLine, TracePanel, TraceStyle};
 use crate::report::words::torque_or_force;
 use cft_ident_core::number;
 use cft_ident_stages::identify::LoggedRobot;
@@ -12,14 +12,14 @@ use cft_ident_stages::replay::{JointSeries, TorqueSeries};
 
 /// How the torque of a model is drawn.
 #[derive(Debug, Clone)]
-pub struct Drawn {
+pub struct TorqueDrawing {
     /// Name of its torque, and of its residual.
     pub names: [Cow<'static, str>; 2],
     pub styles: [TraceStyle; 2],
 }
 
 /// The only model.
-pub const ONLY: Drawn = Drawn {
+pub const ONLY: TorqueDrawing = TorqueDrawing {
     names: [
         Cow::Borrowed("reconstructed"),
         Cow::Borrowed("measured \u{2212} reconstructed"),
@@ -28,7 +28,7 @@ pub const ONLY: Drawn = Drawn {
 };
 
 /// Torques of logs by models that are drawn so.
-fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[Drawn]) -> Traces {
+fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[TorqueDrawing]) -> FigureTraces {
     // each log in two forms
     let several = of.len() > 2;
     let traces = of.iter().map(|series| {
@@ -45,13 +45,18 @@ fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[Drawn]) -> Trace
         };
         trace(machine, series, models, name)
     });
-    Traces {
+    FigureTraces {
         label: "Measured and reconstructed torque over time".into(),
         traces: traces.collect(),
     }
 }
 
-fn trace(machine: &LoggedRobot, of: &TorqueSeries, models: &[Drawn], name: String) -> Trace {
+fn trace(
+    machine: &LoggedRobot,
+    of: &TorqueSeries,
+    models: &[TorqueDrawing],
+    name: String,
+) -> LogTrace {
     let mut panels = Vec::new();
     let joints = machine.robot.joint_names().iter().zip(&of.joints);
     for (j, (joint, series)) in joints.enumerate() {
@@ -83,7 +88,7 @@ fn trace(machine: &LoggedRobot, of: &TorqueSeries, models: &[Drawn], name: Strin
         panels.push(panel(false, joint, quantity, lines));
         panels.push(panel(true, "", "residual", differences));
     }
-    Trace {
+    LogTrace {
         name,
         t: of.t.clone(),
         breaks: of.breaks.clone(),
@@ -117,7 +122,7 @@ pub fn section(
     page: &mut Writer,
     machine: &LoggedRobot,
     of: &[TorqueSeries],
-    models: &[Drawn],
+    models: &[TorqueDrawing],
     title: &str,
 ) {
     page.heading("Torque, measured and reconstructed");

@@ -2,16 +2,18 @@
 
 use crate::report::figure::{ErrorFigure, JointBars, OverlayFigure, OverlayPanel};
 use crate::report::sections::provenance;
-use crate::report::sections::quality::{self, Inspected};
-use crate::report::sections::torque::{self, Drawn};
-use crate::report::table::{Align, Columns, Table};
+use crate::report::sections::quality::{self, InspectedLog};
+use crate::report::sections::torque::{self, TorqueDrawing};
+use crate::report::table::{CellAlignment, Columns, Table};
 use crate::report::traces::TraceStyle;
 use crate::report::words::{listed, of_joint};
 use crate::report::{Report, Writer, usual};
 use cft_ident_core::number;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::compare::{Apart, Difference, ParameterPair, Reason, SideBySide};
-use cft_ident_stages::identify::{Compared, Curves, DIFFERENT, TriedOnLogs};
+use cft_ident_stages::compare::{
+    Difference, ParameterPair, SideBySide, UnpairedParameter, UnpairedReason,
+};
+use cft_ident_stages::identify::{Compared, DIFFERENT, FrictionCurves, TriedOnLogs};
 use cft_ident_stages::replay::{ReplayedPair, is_beyond_curve, speeds};
 
 /// Parameters that a screen has room for.
@@ -68,7 +70,7 @@ pub fn pictures(
     of: &Compared,
     read: &[Provenance],
     replayed: Option<&ReplayedPair>,
-    quality: &[Inspected],
+    quality: &[InspectedLog],
     command: &str,
 ) {
     if !of.curves.is_empty() {
@@ -77,7 +79,7 @@ pub fn pictures(
     }
     if let Some(replayed) = replayed {
         let [a, b] = labels(of);
-        let drawn = |name: String, style| Drawn {
+        let drawn = |name: String, style| TorqueDrawing {
             names: [name.clone().into(), format!("residual of {name}").into()],
             styles: [style, style],
         };
@@ -99,7 +101,7 @@ pub fn pictures(
 /// more; of such a model without logs the declared law alone.
 pub fn figure(of: &Compared, replayed: Option<&ReplayedPair>) -> OverlayFigure {
     let names = of.machine.robot.joint_names();
-    let panel = |shown: &Curves| {
+    let panel = |shown: &FrictionCurves| {
         let speeds: Vec<f64> = speeds(shown.most).collect();
         let mut curves = of.at(shown, speeds.into_iter());
         let joint = names.iter().position(|name| *name == shown.joint);
@@ -245,8 +247,8 @@ pub(super) fn apart_tables(of: &SideBySide, names: &[String; 2]) -> impl Iterato
     sides.map(|(name, only)| apart_table(only, name))
 }
 
-fn apart_table(only: &[Apart], name: &str) -> Table {
-    let reasons = only.iter().any(|p| p.reason != Reason::Absent);
+fn apart_table(only: &[UnpairedParameter], name: &str) -> Table {
+    let reasons = only.iter().any(|p| p.reason != UnpairedReason::Absent);
     Columns::new(&format!("only in {name}"), only)
         .words("joint", |p| p.joint.as_deref().unwrap_or(""))
         .words("parameter", |p| &p.name)
@@ -254,9 +256,9 @@ fn apart_table(only: &[Apart], name: &str) -> Table {
         .words("unit", |p| &p.unit)
         .when(reasons, |t| {
             t.words("in the other", |p| match p.reason {
-                Reason::Absent => "absent",
-                Reason::OtherUnit => "in another unit",
-                Reason::OtherMeaning => "of another meaning",
+                UnpairedReason::Absent => "absent",
+                UnpairedReason::OtherUnit => "in another unit",
+                UnpairedReason::OtherMeaning => "of another meaning",
             })
         })
         .into()
@@ -306,7 +308,7 @@ fn error_table(tried: &TriedOnLogs, logs: &str, [head_a, head_b]: &[String; 2]) 
     .numbers(&format!("{head_b} - {head_a}"), |of| {
         hundred(of.difference.difference)
     })
-    .column(Align::Right, "95 % CI", |of| {
+    .column(CellAlignment::Right, "95 % CI", |of| {
         match of.difference.interval_95 {
             Some([low, high]) => format!("{}..{}", hundred(low), hundred(high)),
             None => number::ABSENT.to_owned(),

@@ -3,16 +3,16 @@
 use super::diagnose_words::{errors as errors_of, words};
 use super::step_words::{alternatives, certainty, grade, in_words, seen, torque, worsened};
 use super::{first_screen, formulas, found_effects, what_is_left};
-use crate::report::sections::quality::{self, Inspected};
-use crate::report::sections::torque::Drawn;
+use crate::report::sections::quality::{self, InspectedLog};
+use crate::report::sections::torque::TorqueDrawing;
 use crate::report::sections::{
     fit, free_run, friction, parameters, provenance, residual, sketch, torque,
 };
-use crate::report::table::{Align, Columns, Table};
+use crate::report::table::{CellAlignment, Columns, Table};
 use crate::report::traces::TraceStyle;
 use crate::report::words::listed;
 use crate::report::{Report, Writer, summary};
-use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, LeftCandidate, SplitErrors};
+use cft_ident_core::diagnose::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors, UseErrors};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
@@ -27,7 +27,7 @@ const MAX_CHANGES_ON_SCREEN: usize = 2;
 const MARGIN: &str = "     ";
 
 /// The parts of the report.
-pub struct Diagnose<'a> {
+pub struct DiagnoseReport<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
     /// The model file.
@@ -41,7 +41,7 @@ pub struct Diagnose<'a> {
 }
 
 /// The effects, their numbers, the residual that is left, and the errors before and after.
-pub fn diagnose(of: &Diagnose) -> Report {
+pub fn diagnose(of: &DiagnoseReport) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
     words(of.machine, of.found).write(&mut report.everywhere());
     let typed = (of.refined, of.path, of.logs);
@@ -57,9 +57,9 @@ pub fn diagnose(of: &Diagnose) -> Report {
 /// Further parts of the page.
 pub fn pictures(
     page: &mut Writer,
-    of: &Diagnose,
+    of: &DiagnoseReport,
     replayed: &ReplayedDiagnosis,
-    quality: &[Inspected],
+    quality: &[InspectedLog],
     command: &str,
 ) {
     let (machine, found) = (of.machine, of.found);
@@ -143,7 +143,7 @@ fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
         .numbers(if changed { "after" } else { "error" }, |j| {
             hundred(relative[j])
         })
-        .column(Align::Right, "95 % CI", |j| {
+        .column(CellAlignment::Right, "95 % CI", |j| {
             after.joints[j].interval_95.map(hundred).join("..")
         })
         .when(
@@ -230,7 +230,7 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
         .numbers("after", |j| fitted(now, j))
         .numbers("held-out", |j| unseen(&d.before, j))
         .numbers("after", |j| unseen(now, j))
-        .column(Align::Right, "95 % CI", |j| match &now.holdout {
+        .column(CellAlignment::Right, "95 % CI", |j| match &now.holdout {
             Some(errors) => errors.joints[j].interval_95.map(hundred).join(".."),
             None => number::ABSENT.to_owned(),
         })
@@ -298,7 +298,7 @@ pub(super) fn sections(
     let errors = errors_of(d.errors_now()).1.joints.iter();
     let errors = errors.map(|e| e.headline());
     sketch::section(page, machine, replayed.poses.as_ref(), errors);
-    let drawn = |name: &'static str, styles| Drawn {
+    let drawn = |name: &'static str, styles| TorqueDrawing {
         names: [name.into(), format!("residual {name}").into()],
         styles,
     };
@@ -349,7 +349,7 @@ pub(super) fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed
         None => vec![("", now)],
     };
     let names = machine.robot.joint_names();
-    let percent = |e: &Errors, j: usize| number::percent(e.joints[j].headline());
+    let percent = |e: &UseErrors, j: usize| number::percent(e.joints[j].headline());
     let mut columns =
         Columns::new("relative torque error", 0..names.len()).words("joint", |j| &names[j]);
     for (side, errors) in &sides {

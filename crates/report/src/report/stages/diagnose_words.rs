@@ -4,8 +4,8 @@
 use super::step_words::titled;
 use crate::report::usual;
 use crate::report::words::listed;
-use crate::report::{Figure, FoundLine, Headline, Tone, Writer};
-use cft_ident_core::diagnose::{Diagnosis, Errors, FoundEffect, SplitErrors, StepStatus};
+use crate::report::{FigureTone, FoundLine, VerdictFigure, VerdictHeadline, Writer};
+use cft_ident_core::diagnose::{Diagnosis, FoundEffect, SplitErrors, StepStatus, UseErrors};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
 use cft_ident_stages::open_loop::JointFreeRun;
@@ -14,12 +14,12 @@ use cft_ident_stages::open_loop::JointFreeRun;
 const NAMED: usize = 3;
 
 /// The verdict on a diagnosis: its figures and what was found.
-pub(super) struct Words {
-    pub headline: Headline,
+pub(super) struct DiagnosisWords {
+    pub headline: VerdictHeadline,
     pub found: Vec<FoundLine>,
 }
 
-impl Words {
+impl DiagnosisWords {
     pub fn write(self, writer: &mut Writer) {
         writer.headline(self.headline);
         writer.found(self.found);
@@ -27,7 +27,7 @@ impl Words {
 }
 
 /// The verdict in figures and words.
-pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> Words {
+pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> DiagnosisWords {
     let d = &found.diagnosis;
     let lacking = found.verdict();
     let mut all = added(machine, d);
@@ -69,31 +69,31 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> Words {
         );
         all.push(said("worse", text));
     }
-    Words {
+    DiagnosisWords {
         headline: headline(machine, d),
         found: all,
     }
 }
 
 /// Error before, error after and what is usual.
-fn headline(machine: &LoggedRobot, d: &Diagnosis) -> Headline {
+fn headline(machine: &LoggedRobot, d: &Diagnosis) -> VerdictHeadline {
     let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
-    let mean = |e: &Errors| e.overall.mean_relative_error_moving;
+    let mean = |e: &UseErrors| e.overall.mean_relative_error_moving;
     let [from, to] = [before, after].map(|e| number::percent(mean(e)));
     let changed = d.written().next().is_some();
     let torque_is = machine.file.log.torque_is;
     let unusual = mean(after) > usual::band(torque_is)[1];
     let tone = match changed {
-        true if mean(after) > mean(before) && from != to => Tone::Worse,
-        _ if unusual => Tone::High,
-        true if from != to => Tone::Better,
-        _ => Tone::Plain,
+        true if mean(after) > mean(before) && from != to => FigureTone::Worse,
+        _ if unusual => FigureTone::High,
+        true if from != to => FigureTone::Better,
+        _ => FigureTone::Plain,
     };
-    let figure = |label, value, tone| Figure { label, value, tone };
+    let figure = |label, value, tone| VerdictFigure { label, value, tone };
     let figures = vec![
-        figure("before", from, Tone::Plain),
+        figure("before", from, FigureTone::Plain),
         figure("after", to, tone),
-        figure("usual", usual::figure(torque_is), Tone::Plain),
+        figure("usual", usual::figure(torque_is), FigureTone::Plain),
     ];
     let joints = match after.joints.len() {
         1 => String::new(),
@@ -105,7 +105,7 @@ fn headline(machine: &LoggedRobot, d: &Diagnosis) -> Headline {
     } else {
         ""
     };
-    Headline {
+    VerdictHeadline {
         figures,
         of: format!("relative torque error in motion, on {data}{joints}{chosen}"),
     }
@@ -161,7 +161,7 @@ fn added(machine: &LoggedRobot, d: &Diagnosis) -> Vec<FoundLine> {
 }
 
 /// The errors that count, and of which data they are: held-out ones where there are any.
-pub(super) fn errors(of: &SplitErrors) -> (&'static str, &Errors) {
+pub(super) fn errors(of: &SplitErrors) -> (&'static str, &UseErrors) {
     match &of.holdout {
         Some(errors) => ("held-out data", errors),
         None => ("the fitted data", &of.train),

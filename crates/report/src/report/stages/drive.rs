@@ -3,7 +3,7 @@
 use crate::report::Report;
 use crate::report::figure::{PositionFigure, PositionPanel};
 use crate::report::table::{Columns, Table};
-use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
+use crate::report::traces::{FigureTraces, LogTrace, TraceLine, TracePanel, TraceStyle};
 use crate::report::words::listed;
 use cft_ident_core::number;
 use cft_ident_drive::drive::identify::PositionCourse;
@@ -68,7 +68,7 @@ pub fn picture(joints: &[String], course: &PositionCourse) -> String {
     figure.svg()
 }
 
-fn traces(joints: &[String], courses: &[PositionCourse]) -> Traces {
+fn traces(joints: &[String], courses: &[PositionCourse]) -> FigureTraces {
     let line = |name: &str, style, values: &[f64]| TraceLine {
         name: name.to_owned(),
         style,
@@ -89,14 +89,14 @@ fn traces(joints: &[String], courses: &[PositionCourse]) -> Traces {
             ],
         };
         let held_out = if course.held_out { ", held out" } else { "" };
-        Trace {
+        LogTrace {
             name: format!("{}{held_out}", course.log),
             t: course.t.clone(),
             breaks: Vec::new(),
             panels: joints.iter().enumerate().map(panel).collect(),
         }
     };
-    Traces {
+    FigureTraces {
         label: "positions over time, measured and rolled out".to_owned(),
         traces: courses.iter().map(trace).collect(),
     }

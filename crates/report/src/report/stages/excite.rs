@@ -1,15 +1,15 @@
 //! The report of `excite`: a motion, judged before the robot moves.
 
-use super::diagnose_words::Words;
+use super::diagnose_words::DiagnosisWords;
 use crate::report::figure::{MotionFigure, MotionPanel};
 use crate::report::table::{Columns, Table, unbroken};
-use crate::report::traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
+use crate::report::traces::{FigureTraces, LogTrace, TraceLine, TracePanel, TraceStyle};
 use crate::report::words::{self, condition, listed};
-use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer};
+use crate::report::{FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline, Writer};
 use cft_ident_core::number;
 use cft_ident_logs::log::escape;
-use cft_ident_plant::excite::foresee::Expected;
-use cft_ident_plant::excite::judgement::{Judgement, LimitUse};
+use cft_ident_plant::excite::foresee::ExpectedEstimate;
+use cft_ident_plant::excite::judgement::{LimitUse, MotionJudgement};
 use cft_ident_plant::excite::limits::{BoundedQuantity, Quantity};
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::motion::Motion;
@@ -18,7 +18,7 @@ use cft_ident_plant::excite::motion::Motion;
 const PARTS: usize = 4;
 
 /// The judgement of a motion; `path` names the trajectory, `name` is the same without folders.
-pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
+pub fn excite(judged: &MotionJudgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
     let first = judged.first_words().into_iter();
@@ -81,7 +81,7 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
 }
 
 /// Further parts of the page: the motion over time, its spectrum, and the warnings.
-pub fn course(page: &mut Writer, judged: &Judgement, figure: &MotionFigure) {
+pub fn course(page: &mut Writer, judged: &MotionJudgement, figure: &MotionFigure) {
     page.heading("Positions, speeds and drives");
     page.traces(&traces(figure), figure.svg());
     spectrum(page, judged);
@@ -92,7 +92,7 @@ pub fn course(page: &mut Writer, judged: &Judgement, figure: &MotionFigure) {
 }
 
 /// The nearest limit and the condition as figures, and whether every limit is kept.
-fn verdict(judged: &Judgement, name: &str) -> Words {
+fn verdict(judged: &MotionJudgement, name: &str) -> DiagnosisWords {
     let broken = judged.broken().len();
     let (grade, text) = match broken {
         0 if !judged.torques_foreseen => (
@@ -107,11 +107,15 @@ fn verdict(judged: &Judgement, name: &str) -> Words {
         1 => ("not safe", "The motion breaks a limit.".to_owned()),
         n => ("not safe", format!("The motion breaks {n} limits.")),
     };
-    let figure = |label, value, tone| Figure { label, value, tone };
+    let figure = |label, value, tone| VerdictFigure { label, value, tone };
     let mut figures = Vec::new();
     let all = judged.limits.iter();
     if let Some(nearest) = all.max_by(|a, b| a.used.total_cmp(&b.used)) {
-        let tone = if broken > 0 { Tone::Worse } else { Tone::Plain };
+        let tone = if broken > 0 {
+            FigureTone::Worse
+        } else {
+            FigureTone::Plain
+        };
         let value = format!(
             "{} ({} {})",
             number::percent(nearest.used),
@@ -122,10 +126,10 @@ fn verdict(judged: &Judgement, name: &str) -> Words {
     }
     if judged.friction.is_none() && judged.separates.is_none() {
         let scaled = condition(judged.condition.normalised);
-        figures.push(figure("condition", scaled, Tone::Plain));
+        figures.push(figure("condition", scaled, FigureTone::Plain));
     }
     let seconds = format!("{} s", number::significant(judged.seconds, 4));
-    figures.push(figure("time", seconds, Tone::Plain));
+    figures.push(figure("time", seconds, FigureTone::Plain));
     let mut found = vec![FoundLine { grade, text }];
     if let Some(of) = &judged.separates {
         let deviations = number::significant(of.deviations, 2);
@@ -134,7 +138,7 @@ fn verdict(judged: &Judgement, name: &str) -> Words {
             figure(
                 "separates by",
                 format!("{deviations} std errors"),
-                Tone::Plain,
+                FigureTone::Plain,
             ),
         );
         found.push(FoundLine {
@@ -148,16 +152,16 @@ fn verdict(judged: &Judgement, name: &str) -> Words {
                 of.from
             ),
         });
-        return Words {
-            headline: Headline {
+        return DiagnosisWords {
+            headline: VerdictHeadline {
                 figures,
                 of: name.to_owned(),
             },
             found,
         };
     }
-    Words {
-        headline: Headline {
+    DiagnosisWords {
+        headline: VerdictHeadline {
             figures,
             of: format!("{name}; condition of the regressor with columns scaled"),
         },
@@ -165,7 +169,7 @@ fn verdict(judged: &Judgement, name: &str) -> Words {
     }
 }
 
-fn limits(judged: &Judgement, name: &str) -> Table {
+fn limits(judged: &MotionJudgement, name: &str) -> Table {
     let value = |v: f64| number::significant(v, 4);
     let periods = judged.periods.map(|periods| format!(", {periods} periods"));
     let caption = format!(
@@ -196,7 +200,7 @@ fn limits(judged: &Judgement, name: &str) -> Table {
 /// Expected deviations, and the relative ones of `beside` in a column of their own.
 fn expected(
     caption: &str,
-    parameters: &[Expected],
+    parameters: &[ExpectedEstimate],
     beside: Option<(&str, Vec<Option<f64>>)>,
 ) -> Table {
     let (name, stds) = beside.unwrap_or_default();
@@ -213,7 +217,7 @@ fn expected(
 }
 
 /// The combination of parameters that the motion separates least.
-fn apart(report: &mut Report, judged: &Judgement) {
+fn apart(report: &mut Report, judged: &MotionJudgement) {
     let parts = judged.weakest_direction.iter();
     let words = parts.clone().take(PARTS);
     let words = words.map(|part| format!("{:+.2} {}", part.weight, part.parameter));
@@ -239,7 +243,7 @@ fn apart(report: &mut Report, judged: &Judgement) {
 }
 
 /// Where the power of the torques lies, of a series.
-fn bands(judged: &Judgement) -> Option<String> {
+fn bands(judged: &MotionJudgement) -> Option<String> {
     let bands = judged.band.as_ref()?.iter().map(|band| {
         let hz = number::significant(band.torque_power_99_below_hz, 2);
         unbroken(&format!("{} {hz} Hz", band.joint))
@@ -250,7 +254,7 @@ fn bands(judged: &Judgement) -> Option<String> {
     ))
 }
 
-fn traces(figure: &MotionFigure) -> Traces {
+fn traces(figure: &MotionFigure) -> FigureTraces {
     let panels = figure.rows.iter().flat_map(|(name, panels)| {
         panels.iter().map(move |panel| TracePanel {
             name: name.clone(),
@@ -265,9 +269,9 @@ fn traces(figure: &MotionFigure) -> Traces {
             }],
         })
     });
-    Traces {
+    FigureTraces {
         label: "Positions, speeds and drives over time".into(),
-        traces: vec![Trace {
+        traces: vec![LogTrace {
             name: figure.title.clone(),
             t: figure.t.clone(),
             breaks: vec![0],
@@ -277,7 +281,7 @@ fn traces(figure: &MotionFigure) -> Traces {
 }
 
 /// Speed amplitudes by harmonic, and the band of the torque.
-fn spectrum(page: &mut Writer, judged: &Judgement) {
+fn spectrum(page: &mut Writer, judged: &MotionJudgement) {
     let Some(spectrum) = &judged.spectrum else {
         return;
     };
@@ -305,7 +309,7 @@ const POINTS: usize = 1500;
 pub fn figure(
     machine: &ForeseenRobot,
     motion: &Motion,
-    judged: &Judgement,
+    judged: &MotionJudgement,
     title: &str,
 ) -> MotionFigure {
     let seconds = motion.seconds();

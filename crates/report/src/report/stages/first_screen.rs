@@ -3,7 +3,7 @@
 use super::diagnose_words::{errors as errors_of, is_exact, worst};
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
 use crate::report::{Report, Writer, usual};
-use cft_ident_core::diagnose::{Errors, FoundEffect};
+use cft_ident_core::diagnose::{FoundEffect, UseErrors};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, separating_command};
@@ -43,7 +43,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
         None => "the fitted data",
     };
     let errors = [&d.before, d.errors_now()].map(|split| errors_of(split).1);
-    let bar = |errors: &Errors, j: usize| ErrorBar {
+    let bar = |errors: &UseErrors, j: usize| ErrorBar {
         error: errors.joints[j].headline(),
         interval_95: Some(errors.joints[j].interval_95),
     };

@@ -2,7 +2,7 @@
 
 use super::what_is_left::axis_of;
 use crate::report::Writer;
-use crate::report::figure::{Cells, EffectFigure};
+use crate::report::figure::{EffectFigure, PictureGroup};
 use crate::report::words::listed;
 use cft_ident_core::diagnose::{FormulaEnd, FormulaPicture};
 use cft_ident_core::number;
@@ -118,7 +118,7 @@ fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
     )
 }
 
-fn figure(machine: &LoggedRobot, of: &FormulaResult, picture: &FormulaPicture) -> Cells {
+fn figure(machine: &LoggedRobot, of: &FormulaResult, picture: &FormulaPicture) -> PictureGroup {
     let joint = joint_of(machine, of);
     let unit = machine.file.torque_unit(joint).to_owned();
     let figure = EffectFigure {

@@ -1,9 +1,9 @@
 //! The report of `friction`.
 
 use crate::report::figure::{FrictionFigure, FrictionPanel};
-use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::quality::{self, InspectedLog};
 use crate::report::sections::{fit, parameters, provenance};
-use crate::report::table::{Align, Columns};
+use crate::report::table::{CellAlignment, Columns};
 use crate::report::words::escaped;
 use crate::report::{Report, Writer};
 use cft_ident_core::friction::estimate::{BEYOND, FrictionCurvePoint, curve_std};
@@ -59,7 +59,7 @@ pub fn pictures(
     page: &mut Writer,
     of: &Friction,
     given: &[Provenance],
-    quality: &[Inspected],
+    quality: &[InspectedLog],
     command: &str,
 ) {
     page.heading("Friction");
@@ -92,7 +92,7 @@ fn law(laws: &mut Writer, machine: &LoggedRobot, found: &FrictionOfJoint) {
         .words("joint", |_| &found.joint)
         .words("parameter", |(name, _)| *name)
         .when(parameters.iter().any(|(_, p)| p.theta.is_some()), |t| {
-            t.column(Align::Right, "theta", |(_, p)| {
+            t.column(CellAlignment::Right, "theta", |(_, p)| {
                 p.theta
                     .map_or(number::ABSENT.into(), |theta| theta.to_string())
             })

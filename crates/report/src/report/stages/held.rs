@@ -1,7 +1,7 @@
 //! The report of `lsq --static`.
 
 use crate::report::Report;
-use crate::report::table::{Align, Table};
+use crate::report::table::{CellAlignment, Table};
 use cft_ident_core::number;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_logs::log::escape;
@@ -87,11 +87,11 @@ fn shown(number: &GravityNumber) -> String {
 
 fn parameters(of: &GravityFit) -> Table {
     let columns = [
-        ("parameter", Align::Left),
-        ("value (95 %)", Align::Left),
-        ("unit", Align::Left),
-        ("", Align::Left),
-        ("meaning", Align::Left),
+        ("parameter", CellAlignment::Left),
+        ("value (95 %)", CellAlignment::Left),
+        ("unit", CellAlignment::Left),
+        ("", CellAlignment::Left),
+        ("meaning", CellAlignment::Left),
     ];
     let mut table = Table::new(&columns).caption(&format!(
         "gravity, with intervals by {} blocks of neighbouring poses",
@@ -112,15 +112,15 @@ fn parameters(of: &GravityFit) -> Table {
 fn joints(of: &GravityFit) -> Table {
     let gains = of.joints.iter().any(|joint| joint.gain.is_some());
     let mut columns = vec![
-        ("joint", Align::Left),
-        ("friction at rest", Align::Left),
-        ("offset", Align::Left),
-        ("torque", Align::Decimal),
-        ("left", Align::Decimal),
-        ("unit", Align::Left),
+        ("joint", CellAlignment::Left),
+        ("friction at rest", CellAlignment::Left),
+        ("offset", CellAlignment::Left),
+        ("torque", CellAlignment::Decimal),
+        ("left", CellAlignment::Decimal),
+        ("unit", CellAlignment::Left),
     ];
     if gains {
-        columns.push(("gain", Align::Left));
+        columns.push(("gain", CellAlignment::Left));
     }
     let mut table = Table::new(&columns);
     for joint in &of.joints {

@@ -2,7 +2,7 @@
 
 use super::{diagnose, diagnose_words, first_screen, friction as filter};
 use super::{lsq, quality_of_fit, validate};
-use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::quality::{self, InspectedLog};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::words::{escaped, listed};
 use crate::report::{Report, Writer};
@@ -12,10 +12,10 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_stages::identify::{Campaigned, DiagnoseEnd, Diagnosed, LoggedRobot};
-use cft_ident_stages::replay::{Replayed, ReplayedDiagnosis};
+use cft_ident_stages::replay::{ReplayedDiagnosis, ReplayedLogs};
 
 /// The parts of the report.
-pub struct Identify<'a> {
+pub struct IdentifyReport<'a> {
     pub machine: &'a LoggedRobot,
     /// Name of the campaign.
     pub campaign: &'a str,
@@ -33,7 +33,7 @@ pub struct Identify<'a> {
     pub logs: &'a str,
 }
 
-impl Identify<'_> {
+impl IdentifyReport<'_> {
     fn model(&self) -> &ModelFile {
         self.found.refined.as_ref().unwrap_or(&self.found.model)
     }
@@ -74,7 +74,7 @@ impl Identify<'_> {
 }
 
 /// The parameters, the quality of the fit, the errors, and the effects that the model lacks.
-pub fn identify(of: &Identify) -> Report {
+pub fn identify(of: &IdentifyReport) -> Report {
     let (machine, found) = (of.machine, of.found);
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
     of.verdicts(&mut report.everywhere());
@@ -135,12 +135,12 @@ fn guesses(writer: &mut Writer, guesses: &[String]) {
 }
 
 /// The origin of the pages of a campaign.
-pub struct Origin<'a> {
+pub struct CampaignOrigin<'a> {
     /// Text of the campaign file.
     pub campaign: &'a str,
     pub inputs: &'a [Provenance],
     pub warnings: &'a [String],
-    pub quality: &'a [Inspected],
+    pub quality: &'a [InspectedLog],
     pub command: &'a str,
 }
 
@@ -150,13 +150,13 @@ pub enum ShownLogs<'a> {
     /// There are no unseen logs, or they are too long to be held.
     Nothing,
     /// The unseen logs, where nothing was diagnosed.
-    Model(&'a Replayed),
+    Model(&'a ReplayedLogs),
     /// The logs of the diagnosis.
     Diagnosis(&'a ReplayedDiagnosis),
 }
 
 /// Further parts of the page.
-pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Origin) {
+pub fn pictures(page: &mut Writer, of: &IdentifyReport, shown: ShownLogs, origin: &CampaignOrigin) {
     let (machine, found) = (of.machine, of.found);
     if let Some((laws, _)) = &found.friction {
         page.heading("Friction");

@@ -1,15 +1,15 @@
 //! The report of `inspect`: the contents of logs and their faults.
 
-use crate::report::table::{Align, Columns};
+use crate::report::table::{CellAlignment, Columns};
 use crate::report::words::listed;
 use crate::report::{Report, Writer};
 use cft_ident_core::number;
-use cft_ident_logs::inspect::{Findings, LogFault, RowCost, Severity};
+use cft_ident_logs::inspect::{LogFault, LogFindings, RowCost, Severity};
 use cft_ident_logs::log::escape;
 use cft_ident_stages::setup::{Finding, FindingSeverity};
 
 /// The findings of logs, by their names, and of the set-up of the robot file that reads them.
-pub fn inspect(logs: &[(String, Findings)], setup: &[Finding]) -> Report {
+pub fn inspect(logs: &[(String, LogFindings)], setup: &[Finding]) -> Report {
     let mut report = Report::new("Logs");
     for (name, found) in logs {
         let mut out = report.everywhere();
@@ -27,7 +27,7 @@ pub fn inspect(logs: &[(String, Findings)], setup: &[Finding]) -> Report {
     report
 }
 
-fn head(name: &str, found: &Findings, setup: &[Finding]) -> String {
+fn head(name: &str, found: &LogFindings, setup: &[Finding]) -> String {
     let of_setup = |severity: Severity| {
         let alike = |finding: &&Finding| match finding.severity {
             FindingSeverity::Error => severity == Severity::Error,
@@ -71,7 +71,7 @@ fn head(name: &str, found: &Findings, setup: &[Finding]) -> String {
     head
 }
 
-fn channels(out: &mut Writer, found: &Findings) {
+fn channels(out: &mut Writer, found: &LogFindings) {
     let limits = |[low, high]: [f64; 2]| {
         format!(
             "{}..{}",
@@ -92,7 +92,7 @@ fn channels(out: &mut Writer, found: &Findings) {
     out.table(columns);
 }
 
-fn joints(out: &mut Writer, found: &Findings) {
+fn joints(out: &mut Writer, found: &LogFindings) {
     if found.joints.is_empty() {
         return;
     }
@@ -107,7 +107,7 @@ fn joints(out: &mut Writer, found: &Findings) {
         .numbers("travel", |joint| shown(joint.travel))
         .numbers("speed", |joint| shown(joint.speed_max))
         .numbers("acc.", |joint| shown(joint.acceleration_max))
-        .column(Align::Right, "reversals", |joint| {
+        .column(CellAlignment::Right, "reversals", |joint| {
             joint.reversals.to_string()
         })
         .percent("moving", |joint| joint.moving_share)
@@ -120,7 +120,7 @@ fn joints(out: &mut Writer, found: &Findings) {
     out.table_apart(columns);
 }
 
-fn faults(out: &mut Writer, found: &Findings) {
+fn faults(out: &mut Writer, found: &LogFindings) {
     if !found.costs.is_empty() {
         let causes = listed(found.costs.iter().map(RowCost::text));
         let text = format!("rows that a fit leaves out or bridges: {causes}");

@@ -1,14 +1,16 @@
 //! The report of `lsq`.
 
-use super::diagnose_words::Words;
+use super::diagnose_words::DiagnosisWords;
 use super::first_screen;
 use super::quality_of_fit::{bodies, condition, consistent, fit_quality};
 use crate::report::figure::{ErrorFigure, JointBars};
-use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::quality::{self, InspectedLog};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::{Columns, unbroken};
 use crate::report::words::{escaped, listed};
-use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer, summary, usual};
+use crate::report::{
+    FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline, Writer, summary, usual,
+};
 use cft_ident_core::number;
 use cft_ident_core::verdict::IDENTIFIED;
 use cft_ident_files::config::ModelFile;
@@ -16,10 +18,10 @@ use cft_ident_logs::log::Provenance;
 use cft_ident_stages::identify::{
     FrictionOfFit, Gain, IdentifiedDynamics, JointResidual, LoggedRobot, MotionFit,
 };
-use cft_ident_stages::replay::Replayed;
+use cft_ident_stages::replay::ReplayedLogs;
 
 /// The parts of the report.
-pub struct Lsq<'a> {
+pub struct LsqReport<'a> {
     pub machine: &'a LoggedRobot,
     pub found: &'a IdentifiedDynamics,
     /// The model that was fitted.
@@ -36,7 +38,7 @@ pub struct Lsq<'a> {
 const MAX_PARAMETERS_ON_SCREEN: usize = 8;
 
 /// The verdict, the residual of the fit, the parameters and the quality of the fit.
-pub fn lsq(of: &Lsq) -> Report {
+pub fn lsq(of: &LsqReport) -> Report {
     let mut report = Report::new(&format!("Least squares fit to {}", escaped(of.logs)));
     words(of).write(&mut report.everywhere());
     next(&mut report.terminal(), of.path);
@@ -94,7 +96,7 @@ pub fn lsq(of: &Lsq) -> Report {
 }
 
 /// Errors of the fitted data joint by joint as bars.
-fn bars(of: &Lsq) -> ErrorFigure {
+fn bars(of: &LsqReport) -> ErrorFigure {
     let moving = of.found.joints.iter().filter(|joint| joint.moves());
     let joints = moving.map(|joint| JointBars {
         joint: joint.joint.clone(),
@@ -114,10 +116,10 @@ fn bars(of: &Lsq) -> ErrorFigure {
 /// `replayed` is absent where the logs are too long to be held.
 pub fn pictures(
     page: &mut Writer,
-    of: &Lsq,
-    replayed: Option<&Replayed>,
+    of: &LsqReport,
+    replayed: Option<&ReplayedLogs>,
     given: &[Provenance],
-    quality: &[Inspected],
+    quality: &[InspectedLog],
     command: &str,
 ) {
     parameters::section(page, of.file, &|_| None);
@@ -142,7 +144,7 @@ fn next(writer: &mut Writer, path: &str) {
 }
 
 /// The error of the fit beside what is usual, and whether the model can be used.
-fn words(of: &Lsq) -> Words {
+fn words(of: &LsqReport) -> DiagnosisWords {
     let joints: Vec<&JointResidual> = of.found.joints.iter().filter(|j| j.moves()).collect();
     let square: f64 = joints.iter().map(|j| j.headline().powi(2)).sum();
     let rms = (square / joints.len().max(1) as f64).sqrt();
@@ -150,11 +152,11 @@ fn words(of: &Lsq) -> Words {
     let unusual = rms > usual::band(torque_is)[1];
     let useless = joints.iter().filter(|j| j.headline() >= 1.0);
     let useless = listed(useless.map(|j| j.joint.as_str()));
-    let figure = |label, value, tone| Figure { label, value, tone };
+    let figure = |label, value, tone| VerdictFigure { label, value, tone };
     let tone = match (useless.is_empty(), unusual) {
-        (false, _) => Tone::Worse,
-        (true, true) => Tone::High,
-        _ => Tone::Plain,
+        (false, _) => FigureTone::Worse,
+        (true, true) => FigureTone::High,
+        _ => FigureTone::Plain,
     };
     let mut figures = vec![figure("error", number::percent(rms), tone)];
     let worst = joints.iter();
@@ -162,10 +164,10 @@ fn words(of: &Lsq) -> Words {
     let mut over = String::new();
     if let Some(worst) = worst.filter(|_| joints.len() > 1) {
         let value = format!("{} ({})", number::percent(worst.headline()), worst.joint);
-        figures.push(figure("largest", value, Tone::Plain));
+        figures.push(figure("largest", value, FigureTone::Plain));
         over = format!(", rms over {} joints", joints.len());
     }
-    figures.push(figure("usual", usual::figure(torque_is), Tone::Plain));
+    figures.push(figure("usual", usual::figure(torque_is), FigureTone::Plain));
     let resting = of.found.joints.iter().filter(|j| !j.moves());
     let mut found = super::validate::still(resting.map(|j| &*j.joint));
     let mut say = |grade, text| found.push(FoundLine { grade, text });
@@ -187,8 +189,8 @@ fn words(of: &Lsq) -> Words {
     }
     let (tally, all) = parameters::tally(of.file);
     say(if all { "known" } else { "partly known" }, tally);
-    Words {
-        headline: Headline {
+    DiagnosisWords {
+        headline: VerdictHeadline {
             figures,
             of: format!("relative torque error of the fit, on the fitted data{over}"),
         },

@@ -3,10 +3,12 @@
 use crate::report::table::{Columns, Table, unbroken};
 use crate::report::words::listed;
 use crate::report::{Writer, words};
-use cft_ident_core::math::descent::Ending;
+use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::number;
 use cft_ident_core::verdict::{Verdict, WEAK};
-use cft_ident_stages::identify::{Account, ConsistentLinks, IdentifiedDynamics, JointAccount};
+use cft_ident_stages::identify::{
+    ConsistentLinks, EstimatorAccount, IdentifiedDynamics, JointAccount,
+};
 
 /// Condition, rank and effective sample size of the fit.
 pub(super) fn condition(terminal: &mut Writer, found: &IdentifiedDynamics) {
@@ -79,11 +81,11 @@ fn open_directions(terminal: &mut Writer, found: &IdentifiedDynamics) {
 }
 
 /// How the estimator went; nothing for least squares.
-fn account(terminal: &mut Writer, account: &Account) {
+fn account(terminal: &mut Writer, account: &EstimatorAccount) {
     let ended = match account.status {
-        Ending::Converged => "converged",
-        Ending::IterationLimit => "stopped at the limit of iterations",
-        Ending::Diverged => "diverged",
+        IterationEnding::Converged => "converged",
+        IterationEnding::IterationLimit => "stopped at the limit of iterations",
+        IterationEnding::Diverged => "diverged",
     };
     let passes = account.iterations;
     if passes > 1 {

@@ -1,10 +1,10 @@
 //! The report of `show`: a model file as a person wants to know it.
 
-use super::diagnose_words::Words;
+use super::diagnose_words::DiagnosisWords;
 use crate::report::sections::parameters;
 use crate::report::table::Columns;
 use crate::report::words::listed;
-use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer};
+use crate::report::{FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline, Writer};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
@@ -14,7 +14,7 @@ use cft_ident_logs::log::escape;
 use cft_ident_stages::identify::{JointInUse, LoggedRobot};
 
 /// The parts of the report.
-pub struct Show<'a> {
+pub struct ShowReport<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
     pub model: &'a AugmentedModel,
@@ -23,7 +23,7 @@ pub struct Show<'a> {
 }
 
 /// The model, first its error in use.
-pub fn show(of: &Show) -> Report {
+pub fn show(of: &ShowReport) -> Report {
     let name = escape(&of.machine.name);
     let mut report = Report::new(&format!("Model {name}"));
     verdict(of).write(&mut report.everywhere());
@@ -43,12 +43,12 @@ pub fn show(of: &Show) -> Report {
 }
 
 /// Error in use and parameters as figures.
-fn verdict(of: &Show) -> Words {
+fn verdict(of: &ShowReport) -> DiagnosisWords {
     let joints = of.machine.robot.joint_names();
-    let figure = |label, value| Figure {
+    let figure = |label, value| VerdictFigure {
         label,
         value,
-        tone: Tone::Plain,
+        tone: FigureTone::Plain,
     };
     let mut figures = Vec::new();
     let mut found = Vec::new();
@@ -93,8 +93,8 @@ fn verdict(of: &Show) -> Words {
         .to_owned(),
     });
     figures.push(figure("joints", joints.len().to_string()));
-    Words {
-        headline: Headline {
+    DiagnosisWords {
+        headline: VerdictHeadline {
             figures,
             of: format!(
                 "{} robot: {}",
@@ -158,7 +158,7 @@ const HEIGHTS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '�
 const STEPS: i32 = 12;
 
 /// The declared friction of each joint over the speeds seen, as a row of characters.
-fn friction(to: &mut Writer, of: &Show) {
+fn friction(to: &mut Writer, of: &ShowReport) {
     let Some((joints, _)) = of.in_use else { return };
     let laws = joints.iter().zip(&of.model.model.friction);
     let laws = laws.filter(|(_, law)| **law != JointFriction::None);
@@ -184,7 +184,7 @@ fn friction(to: &mut Writer, of: &Show) {
     to.table_if_any(columns);
 }
 
-fn effects(terminal: &mut Writer, of: &Show) {
+fn effects(terminal: &mut Writer, of: &ShowReport) {
     let robot = &of.machine.robot;
     let said = of.model.effects.iter().map(|effect| {
         let joint = effect.place.joint().unwrap_or(0);

@@ -2,7 +2,7 @@
 
 use crate::report::words::{listed, scaled};
 use cft_ident_core::diagnose::{FoundEffect, NotWritten, StepStatus};
-use cft_ident_core::effect::Added;
+use cft_ident_core::effect::ModelEffect;
 use cft_ident_core::number;
 use cft_ident_stages::identify::{LoggedRobot, accept_option, numbers_of};
 
@@ -80,7 +80,7 @@ pub(super) fn seen(machine: &LoggedRobot, step: &FoundEffect) -> Option<String> 
 }
 
 /// The name of an effect where it was found.
-pub(super) fn titled(machine: &LoggedRobot, effect: &Added) -> String {
+pub(super) fn titled(machine: &LoggedRobot, effect: &ModelEffect) -> String {
     let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
     effect.said_and_named(&machine.robot, unit)
 }

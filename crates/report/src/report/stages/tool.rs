@@ -2,7 +2,7 @@
 
 use crate::report::figure::{CourseFigure, CoursePanel};
 use crate::report::sections::provenance;
-use crate::report::table::{Align, Table};
+use crate::report::table::{CellAlignment, Table};
 use crate::report::{Report, Writer};
 use cft_ident_core::number;
 use cft_ident_logs::log::Provenance;
@@ -146,10 +146,10 @@ fn shown(p: &ToolNumber) -> [String; 3] {
 
 fn parameters(of: &ToolResult) -> Table {
     let columns = [
-        ("", Align::Left),
-        ("value (95 %)", Align::Left),
-        ("unit", Align::Left),
-        ("", Align::Left),
+        ("", CellAlignment::Left),
+        ("value (95 %)", CellAlignment::Left),
+        ("unit", CellAlignment::Left),
+        ("", CellAlignment::Left),
     ];
     let mut table = Table::new(&columns).caption(&format!(
         "along the sensor's axes, from its origin; intervals by {} blocks of neighbours",
@@ -164,10 +164,10 @@ fn parameters(of: &ToolResult) -> Table {
 
 fn steps(of: &ToolResult) -> Table {
     let columns = [
-        ("effect", Align::Left),
-        ("status", Align::Left),
-        ("deviations", Align::Decimal),
-        ("force error [N]", Align::Left),
+        ("effect", CellAlignment::Left),
+        ("status", CellAlignment::Left),
+        ("deviations", CellAlignment::Decimal),
+        ("force error [N]", CellAlignment::Left),
     ];
     let mut table = Table::new(&columns);
     for step in &of.steps {
@@ -182,9 +182,9 @@ fn steps(of: &ToolResult) -> Table {
 
 fn errors(of: &ToolResult) -> Table {
     let columns = [
-        ("mean norm of the error", Align::Left),
-        ("bias and weight", Align::Decimal),
-        ("with effects", Align::Decimal),
+        ("mean norm of the error", CellAlignment::Left),
+        ("bias and weight", CellAlignment::Decimal),
+        ("with effects", CellAlignment::Decimal),
     ];
     let mut table = Table::new(&columns);
     let mut row = |name: &str, before: f64, after: f64| {
@@ -217,9 +217,9 @@ fn errors(of: &ToolResult) -> Table {
 
 fn readings(of: &ToolResult) -> Table {
     let columns = [
-        ("wrench along", Align::Left),
-        ("orientation is", Align::Left),
-        ("force error, rows left out [N]", Align::Decimal),
+        ("wrench along", CellAlignment::Left),
+        ("orientation is", CellAlignment::Left),
+        ("force error, rows left out [N]", CellAlignment::Decimal),
     ];
     let mut table = Table::new(&columns).caption("ways to read the log");
     for tried in &of.readings {

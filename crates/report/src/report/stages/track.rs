@@ -2,7 +2,7 @@
 
 use crate::report::figure::{CourseFigure, CoursePanel};
 use crate::report::sections::provenance;
-use crate::report::table::{Align, Columns, Table};
+use crate::report::table::{CellAlignment, Columns, Table};
 use crate::report::words::of_joint;
 use crate::report::{Report, Writer, words};
 use cft_ident_core::number;
@@ -153,7 +153,9 @@ fn changes(of: &Tracked) -> Table {
         .words("log", |(robot, c)| escape(&robot.logs[c.log]))
         .estimates(["size", "std"], |(_, c)| (c.size, c.std))
         .words("unit", |(_, c)| &c.unit)
-        .column(Align::Right, "change", |(_, c)| words::percent(c.relative))
+        .column(CellAlignment::Right, "change", |(_, c)| {
+            words::percent(c.relative)
+        })
         .into()
 }
 

@@ -1,24 +1,26 @@
 //! The report of `validate`.
 
-use super::diagnose_words::Words;
+use super::diagnose_words::DiagnosisWords;
 use crate::report::figure::{ErrorFigure, JointBars, JointTorque, TorqueFigure, parted};
-use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::quality::{self, InspectedLog};
 use crate::report::sections::{
     fit, free_run, friction, parameters, provenance, residual, sketch, torque,
 };
 use crate::report::table::{Columns, unbroken};
 use crate::report::words::{escaped, listed, percent as known_percent, r2};
-use crate::report::{Figure, FoundLine, Headline, Report, Tone, Writer, summary, usual};
+use crate::report::{
+    FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline, Writer, summary, usual,
+};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
-use cft_ident_core::validate::{JointError, TorqueErrors, Validation};
+use cft_ident_core::validate::{JointError, TorqueErrors, TorqueValidation};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, TorqueIs, escape};
 use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for};
-use cft_ident_stages::replay::Replayed;
+use cft_ident_stages::replay::ReplayedLogs;
 
 /// The parts of the report.
-pub struct Validate<'a> {
+pub struct ValidateReport<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
     pub model: &'a AugmentedModel,
@@ -36,7 +38,7 @@ pub struct Validate<'a> {
 }
 
 /// The errors, and the verdict on them.
-pub fn validate(of: &Validate) -> Report {
+pub fn validate(of: &ValidateReport) -> Report {
     let judged = of.found.judged();
     let title = escaped(of.logs);
     let mut report = Report::new(&format!(
@@ -96,7 +98,7 @@ pub fn validate(of: &Validate) -> Report {
 }
 
 /// Errors joint by joint as bars, with the limit that the user set.
-fn bars(of: &Validate) -> ErrorFigure {
+fn bars(of: &ValidateReport) -> ErrorFigure {
     let used = |j: usize| {
         let by_use = of.found.by_use.as_ref()?;
         by_use.used.errors.joints.get(j)
@@ -119,9 +121,9 @@ fn bars(of: &Validate) -> ErrorFigure {
 /// Further parts of the page; `replayed` is absent where the logs are too long to be held.
 pub fn pictures(
     page: &mut Writer,
-    of: &Validate,
-    replayed: Option<&Replayed>,
-    quality: &[Inspected],
+    of: &ValidateReport,
+    replayed: Option<&ReplayedLogs>,
+    quality: &[InspectedLog],
     command: &str,
 ) {
     let validation = &of.found.validation;
@@ -222,17 +224,17 @@ pub(super) fn words(
     of: &TorqueErrors,
     (limit, torque_is): (Option<f64>, Option<TorqueIs>),
     title: &str,
-) -> Words {
-    let figure = |label, value, tone| Figure { label, value, tone };
+) -> DiagnosisWords {
+    let figure = |label, value, tone| VerdictFigure { label, value, tone };
     let error = of.overall.mean_relative_error_moving;
     let beyond =
         |e: &&JointError| limit.is_some_and(|limit| e.headline().is_nan() || e.headline() > limit);
     let beyond = of.joints.iter().filter(|e| e.moves()).filter(beyond);
     let beyond = listed(beyond.map(|e| e.joint.as_str()));
     let tone = match (beyond.is_empty(), error > usual::band(torque_is)[1]) {
-        (false, _) => Tone::Worse,
-        (true, true) => Tone::High,
-        _ => Tone::Plain,
+        (false, _) => FigureTone::Worse,
+        (true, true) => FigureTone::High,
+        _ => FigureTone::Plain,
     };
     let mut figures = vec![figure("error", number::percent(error), tone)];
     let joints = of.joints.iter().filter(|e| e.moves());
@@ -240,10 +242,10 @@ pub(super) fn words(
     let mut over = String::new();
     if let Some(worst) = worst.filter(|_| of.joints.len() > 1) {
         let value = format!("{} ({})", number::percent(worst.headline()), worst.joint);
-        figures.push(figure("largest", value, Tone::Plain));
+        figures.push(figure("largest", value, FigureTone::Plain));
         over = format!(", rms over {} joints", of.joints.len());
     }
-    figures.push(figure("usual", usual::figure(torque_is), Tone::Plain));
+    figures.push(figure("usual", usual::figure(torque_is), FigureTone::Plain));
     let mut found = still(of.joints.iter().filter(|e| !e.moves()).map(|e| &*e.joint));
     if let Some(limit) = limit {
         let limit = number::percent(limit);
@@ -258,8 +260,8 @@ pub(super) fn words(
             },
         });
     }
-    Words {
-        headline: Headline {
+    DiagnosisWords {
+        headline: VerdictHeadline {
             figures,
             of: format!("relative torque error in motion, on {title}{over}"),
         },
@@ -286,7 +288,7 @@ fn errors(page: &mut Writer, of: &TorqueErrors, caption: &str) {
 }
 
 /// Logs that the model was made from are no test of it.
-fn used_before(page: &mut Writer, of: &Validate) {
+fn used_before(page: &mut Writer, of: &ValidateReport) {
     let used = used_for(of.file, &of.found.inputs);
     let used = of.found.inputs.iter().zip(&used).filter(|(_, used)| **used);
     let names = listed(used.map(|(input, _)| escape(&input.name)));
@@ -306,7 +308,7 @@ fn used_before(page: &mut Writer, of: &Validate) {
 }
 
 /// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
-pub fn figure(validation: &Validation, title: &str) -> TorqueFigure {
+pub fn figure(validation: &TorqueValidation, title: &str) -> TorqueFigure {
     let (traces, joints) = (&validation.traces, &validation.errors.joints);
     let of = |values: &[f64], j: usize| {
         let values = values.iter().skip(j).step_by(joints.len());

@@ -1,13 +1,13 @@
 //! What the masses and limits of the robot file say of its torques.
 
-use super::{Words, hint};
+use super::{SetupWords, hint};
 use crate::setup::ChannelKind::Torque;
 use crate::setup::{
     Change, Finding, FindingKind, FindingSeverity, LIMITS, Problem, Setting, Weight, WeightGain,
 };
 use cft_ident_core::number::significant;
 
-impl Words<'_> {
+impl SetupWords<'_> {
     /// What the file's own masses say of the torques, and whether they hold a weight at all.
     pub(super) fn weight(&self, all: &[Weight], without: Option<&[Vec<f64>; 2]>) -> Vec<Finding> {
         // a joint whose gain could be any says nothing

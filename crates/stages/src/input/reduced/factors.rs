@@ -7,12 +7,12 @@ use super::error::ReducedError;
 use super::matrix;
 use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors, JointRows};
 use cft_ident_core::inertia::columns::RegressorColumns;
-use cft_ident_core::inertia::scores::{self, BlockScore, Scores};
+use cft_ident_core::inertia::scores::{self, BlockScore, BlockScores};
 
 /// What a reading of a log holds besides its matrices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Head {
+pub(super) struct ReducedHead {
     block_seconds: f64,
     rows: u64,
     moving: Vec<JointRows>,
@@ -28,7 +28,7 @@ pub(super) struct Head {
 /// Most rows and stretches that a log can have: their sums over logs stay whole numbers.
 const MOST_ROWS: u64 = 1 << 40;
 
-impl Head {
+impl ReducedHead {
     fn counts_are_possible(&self) -> bool {
         let mut blocks = self.blocks.iter().chain(&self.scores);
         let mut joints = self.moving.iter().chain(&self.resting);
@@ -38,7 +38,7 @@ impl Head {
     }
 
     /// Scores from theta_0 and the steps of each joint, and the scores in these.
-    fn scores_of(&self, joints: &[DMatrix<f64>], steps: &[i16]) -> Scores {
+    fn scores_of(&self, joints: &[DMatrix<f64>], steps: &[i16]) -> BlockScores {
         let row = |k: usize| joints.iter().map(|m| m.row(k).transpose()).collect();
         let step: Vec<DVector<f64>> = row(1);
         let mut steps = steps.iter();
@@ -54,7 +54,7 @@ impl Head {
             rows: *rows,
             of_joint: step.iter().map(&mut of_joint).collect(),
         });
-        Scores {
+        BlockScores {
             blocks: blocks.collect(),
             at: row(0),
             step,
@@ -64,20 +64,20 @@ impl Head {
 
 /// A reading of a log.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Factors {
-    head: Head,
+pub(super) struct ReducedFactors {
+    head: ReducedHead,
     /// Per block and joint, then those at rest, then of each joint theta_0 and the steps of its scores as rows.
     matrices: Vec<DMatrix<f64>>,
     /// Scores in steps: by block, joint and unknown, but for those whose step is 0.
     steps: Vec<i16>,
 }
 
-impl Factors {
+impl ReducedFactors {
     pub(super) fn of(factors: BlockFactors, at_rest: bool) -> Self {
         let scores = factors.blocks.iter().find_map(|b| b.scores.clone());
         let shown = scores.iter().flat_map(|s| &s.blocks);
         let blocks = factors.blocks.iter();
-        let head = Head {
+        let head = ReducedHead {
             block_seconds: factors.block_seconds,
             rows: factors.rows,
             blocks: blocks.map(|b| (b.stretch, b.rows)).collect(),
@@ -92,14 +92,14 @@ impl Factors {
             let joints = s.at.iter().zip(&s.step);
             joints.map(|(at, step)| DMatrix::from_rows(&[at.transpose(), step.transpose()]))
         });
-        let of_block = |s: &Scores, b: &BlockScore| -> Vec<i16> {
+        let of_block = |s: &BlockScores, b: &BlockScore| -> Vec<i16> {
             let joints = b.of_joint.iter().zip(&s.step);
             let pairs = joints.flat_map(|(scores, step)| scores.iter().zip(step.iter()));
             let kept = pairs.filter(|(_, step)| **step > 0.0);
             kept.map(|(score, step)| scores::steps(*score, *step) as i16)
                 .collect()
         };
-        Factors {
+        ReducedFactors {
             head,
             matrices: matrices.chain(about).collect(),
             steps: (scores.iter())
@@ -175,7 +175,7 @@ impl Factors {
         })
     }
 
-    pub(super) fn head(&self) -> &Head {
+    pub(super) fn head(&self) -> &ReducedHead {
         &self.head
     }
 
@@ -185,7 +185,7 @@ impl Factors {
     }
 
     /// Takes the matrices of a reading of `joints` joints from the front of `bytes`.
-    pub(super) fn read(head: Head, joints: usize, bytes: &mut &[u8]) -> Option<Self> {
+    pub(super) fn read(head: ReducedHead, joints: usize, bytes: &mut &[u8]) -> Option<Self> {
         let scores = usize::from(!head.scores.is_empty());
         let blocks = head.blocks.len() + usize::from(head.at_rest) + scores;
         // a matrix takes four bytes at least
@@ -206,7 +206,7 @@ impl Factors {
         let steps = steps
             .chunks_exact(2)
             .map(|x| i16::from_le_bytes([x[0], x[1]]));
-        Some(Factors {
+        Some(ReducedFactors {
             steps: steps.collect(),
             head,
             matrices,

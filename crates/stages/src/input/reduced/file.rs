@@ -13,10 +13,10 @@ use flate2::read::{DeflateDecoder, DeflateEncoder};
 use serde::{Deserialize, Serialize};
 
 use super::error::ReducedError;
-use super::factors::{Factors, Head};
+use super::factors::{ReducedFactors, ReducedHead};
 use super::reduced_log::{FrictionGiven, MadeWith, ReducedLog, ReducedLogs, ReducedRows};
 use crate::input::own_settings::{CutoffCosts, OwnSettings};
-use cft_ident_core::motion::{Skipped, Summary};
+use cft_ident_core::motion::{SkippedStretches, Summary};
 use cft_ident_logs::log::{Provenance, REDUCED, begins_with, escape, sha256_of_bytes};
 
 /// Number of the format.
@@ -50,9 +50,9 @@ struct LogHead {
     cutoffs_hz: Vec<f64>,
     costs: CutoffCosts,
     fastest: Vec<f64>,
-    declared: Head,
-    narrower: Head,
-    shifted: Vec<Head>,
+    declared: ReducedHead,
+    narrower: ReducedHead,
+    shifted: Vec<ReducedHead>,
 }
 
 /// [`Summary`] with what documents leave out.
@@ -96,7 +96,7 @@ impl SummaryHead {
             dt: self.dt,
             duration_s: self.duration_s,
             segments: self.segments,
-            skipped: Skipped {
+            skipped: SkippedStretches {
                 segments,
                 samples,
                 spans_s,
@@ -255,7 +255,7 @@ fn unpacked(head: &[u8]) -> Option<Vec<u8>> {
 
 fn read_log(made_with: &Arc<MadeWith>, head: LogHead, rest: &mut &[u8]) -> Option<Arc<ReducedLog>> {
     let n = made_with.joints.len();
-    let mut factors = |head: Head| Factors::read(head, n, rest);
+    let mut factors = |head: ReducedHead| ReducedFactors::read(head, n, rest);
     let numbers = [&head.rest_speed, &head.fastest];
     let per_joint = numbers.iter().all(|list| list.len() == n)
         && [head.costs.of_joint.len(), head.costs.known.len()] == [n, n];
@@ -286,7 +286,7 @@ fn read_log(made_with: &Arc<MadeWith>, head: LogHead, rest: &mut &[u8]) -> Optio
 
 impl ReducedLog {
     /// Every reading, in the order of the file.
-    fn readings(&self) -> impl Iterator<Item = &Factors> {
+    fn readings(&self) -> impl Iterator<Item = &ReducedFactors> {
         [&self.readings.declared, &self.readings.narrower]
             .into_iter()
             .chain(&self.readings.shifted)

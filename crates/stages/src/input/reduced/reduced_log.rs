@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::ReducedError;
-use super::factors::Factors;
+use super::factors::ReducedFactors;
 use crate::input::own_settings::OwnSettings;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
@@ -154,9 +154,9 @@ pub struct ReducedLog {
 /// What the readings of a log left.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ReducedRows {
-    pub(super) declared: Factors,
-    pub(super) narrower: Factors,
-    pub(super) shifted: Vec<Factors>,
+    pub(super) declared: ReducedFactors,
+    pub(super) narrower: ReducedFactors,
+    pub(super) shifted: Vec<ReducedFactors>,
 }
 
 impl ReducedRows {
@@ -166,9 +166,9 @@ impl ReducedRows {
         narrower: BlockFactors,
         shifted: Vec<BlockFactors>,
     ) -> Self {
-        let without_rest = |factors| Factors::of(factors, false);
+        let without_rest = |factors| ReducedFactors::of(factors, false);
         ReducedRows {
-            declared: Factors::of(declared, true),
+            declared: ReducedFactors::of(declared, true),
             narrower: without_rest(narrower),
             shifted: shifted.into_iter().map(without_rest).collect(),
         }

@@ -3,11 +3,11 @@
 //! The definition is turned into a plan once; each message is then walked up to the last field
 //! that is asked for.
 
-use super::cursor::{ByteSpan, Cursor, Encoding, MalformedMessage};
+use super::cursor::{ByteCursor, ByteSpan, Encoding, MalformedMessage};
 use super::leaves;
-use super::msg::{self, ElementType, Field, Messages};
-use super::plan::{By, Node, Slot, Walkthrough};
-use crate::log::recording::message::{Leaf, MessageReader, OpenedReader, Schema, Uneven};
+use super::msg::{self, ElementType, Field, MessageFields};
+use super::plan::{ElementSelector, MessagePlan, PlanNode, PlanSlot};
+use crate::log::recording::message::{FieldLeaf, MessageReader, OpenedReader, Schema, UnevenArray};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
@@ -41,16 +41,16 @@ pub(super) fn open(schema: &Schema, fields: &[Vec<FieldPath>]) -> Option<OpenedR
 /// Reads the numbers of some fields out of the messages of one type.
 #[derive(Debug, Clone)]
 pub struct CdrReader {
-    messages: Messages,
+    messages: MessageFields,
     encoding: Encoding,
-    plan: Walkthrough,
+    plan: MessagePlan,
     /// Place and number of the elements of each array that is asked for.
     arrays: Vec<Option<ByteSpan>>,
     /// Places of the texts in each list of names.
     lists: Vec<Vec<ByteSpan>>,
     /// Of each output the name of the array that is asked for an element by its name.
     labels: Vec<String>,
-    uneven: Option<Uneven>,
+    uneven: Option<UnevenArray>,
     order: u64,
     /// Fields that are messages of arrays by their names, and the names in the message that they were placed by.
     by_name: Option<(Vec<Vec<FieldPath>>, Option<u64>)>,
@@ -82,8 +82,8 @@ impl CdrReader {
     }
 
     /// Plans the reading of `fields`: of the paths that each may have the first that leads to a number.
-    fn new(messages: Messages, encoding: Encoding, fields: &[Vec<FieldPath>]) -> Self {
-        let mut plan = Walkthrough::default();
+    fn new(messages: MessageFields, encoding: Encoding, fields: &[Vec<FieldPath>]) -> Self {
+        let mut plan = MessagePlan::default();
         for (output, paths) in fields.iter().enumerate() {
             let mut paths = paths.iter();
             paths.any(|path| plan.add(&messages, &path.steps, output));
@@ -138,8 +138,8 @@ impl CdrReader {
         self.arrays.fill(None);
         self.lists.iter_mut().for_each(Vec::clear);
         self.uneven = None;
-        let mut cursor = Cursor::new(data, self.encoding)?;
-        let mut walk = Walk {
+        let mut cursor = ByteCursor::new(data, self.encoding)?;
+        let mut walk = CdrWalk {
             messages: &self.messages,
             arrays: &mut self.arrays,
             lists: &mut self.lists,
@@ -152,12 +152,12 @@ impl CdrReader {
                 continue;
             };
             let index = match &mut pick.by {
-                By::Index(index) => *index,
-                By::Name { list, name, last } => {
+                ElementSelector::Index(index) => *index,
+                ElementSelector::Name { list, name, last } => {
                     let names = self.lists.get(*list).map_or(&[][..], Vec::as_slice);
                     if names.len() != array.count {
                         if array.count > 0 && self.uneven.is_none() {
-                            self.uneven = Some(Uneven {
+                            self.uneven = Some(UnevenArray {
                                 array: self.labels[pick.output].clone(),
                                 numbers: array.count,
                                 names: names.len(),
@@ -204,11 +204,11 @@ impl MessageReader for CdrReader {
         self.order
     }
 
-    fn uneven(&self) -> Option<Uneven> {
+    fn uneven(&self) -> Option<UnevenArray> {
         self.uneven.clone()
     }
 
-    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
+    fn leaves(&self, data: &[u8]) -> Vec<FieldLeaf> {
         leaves::leaves(&self.messages, self.encoding, data)
     }
 }
@@ -246,20 +246,20 @@ fn find(data: &[u8], names: &[ByteSpan], name: &str, last: usize) -> Option<usiz
     }
 }
 
-struct Walk<'w> {
+struct CdrWalk<'w> {
     messages: &'w [Vec<Field>],
     arrays: &'w mut [Option<ByteSpan>],
     lists: &'w mut [Vec<ByteSpan>],
     out: &'w mut [Value],
 }
 
-impl Walk<'_> {
+impl CdrWalk<'_> {
     /// Walks a message, to its end where it is not the outermost.
     fn message(
         &mut self,
-        cursor: &mut Cursor<'_>,
+        cursor: &mut ByteCursor<'_>,
         message: usize,
-        node: Option<&Node>,
+        node: Option<&PlanNode>,
     ) -> Result<(), MalformedMessage> {
         let mut wanted = node.map_or(&[][..], |node| &node.slots).iter().peekable();
         let messages = self.messages;
@@ -280,29 +280,29 @@ impl Walk<'_> {
 
     fn field(
         &mut self,
-        cursor: &mut Cursor<'_>,
+        cursor: &mut ByteCursor<'_>,
         field: &Field,
-        slot: Option<&Slot>,
+        slot: Option<&PlanSlot>,
     ) -> Result<(), MalformedMessage> {
         let count = cursor.count(field.count)?;
         match field.kind {
             ElementType::Primitive(kind) => {
                 let span = cursor.primitives(count, kind)?;
                 match slot {
-                    Some(Slot::Number(outputs)) => {
+                    Some(PlanSlot::Number(outputs)) => {
                         let value = cursor.number_at(span.start, kind)?;
                         for output in outputs {
                             self.out[*output] = value;
                         }
                     }
-                    Some(Slot::Array(array)) => self.arrays[*array] = Some(span),
+                    Some(PlanSlot::Array(array)) => self.arrays[*array] = Some(span),
                     _ => {}
                 }
             }
             ElementType::String => {
                 for _ in 0..count {
                     let text = cursor.text()?;
-                    if let Some(Slot::List(list)) = slot {
+                    if let Some(PlanSlot::List(list)) = slot {
                         self.lists[*list].push(text);
                     }
                 }
@@ -314,12 +314,12 @@ impl Walk<'_> {
             }
             ElementType::Message(message) => {
                 let mut elements = match slot {
-                    Some(Slot::Elements(elements)) => elements.as_slice(),
+                    Some(PlanSlot::Elements(elements)) => elements.as_slice(),
                     _ => &[],
                 };
                 for index in 0..count {
                     let inner = match (slot, elements.first()) {
-                        (Some(Slot::Inner(node)), _) => Some(node),
+                        (Some(PlanSlot::Inner(node)), _) => Some(node),
                         (_, Some((element, node))) if *element == index => {
                             elements = &elements[1..];
                             Some(node)

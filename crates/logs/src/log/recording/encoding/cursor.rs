@@ -5,7 +5,7 @@
 
 use thiserror::Error;
 
-use super::msg::{Count, Primitive};
+use super::msg::{ElementCount, PrimitiveType};
 use crate::log::recording::value::Value;
 
 #[derive(Debug, Error)]
@@ -39,7 +39,8 @@ impl ByteSpan {
     }
 }
 
-pub(super) struct Cursor<'d> {
+/// Reads numbers and texts from the bytes of a message, one after the other.
+pub(super) struct ByteCursor<'d> {
     pub(super) data: &'d [u8],
     at: usize,
     big: bool,
@@ -49,7 +50,7 @@ pub(super) struct Cursor<'d> {
     total: usize,
 }
 
-impl<'d> Cursor<'d> {
+impl<'d> ByteCursor<'d> {
     pub(super) fn new(data: &'d [u8], encoding: Encoding) -> Result<Self, MalformedMessage> {
         let total = data.len();
         let (data, big, align) = match (encoding, data) {
@@ -110,20 +111,24 @@ impl<'d> Cursor<'d> {
     }
 
     #[inline]
-    pub(super) fn number_at(&self, at: usize, kind: Primitive) -> Result<Value, MalformedMessage> {
+    pub(super) fn number_at(
+        &self,
+        at: usize,
+        kind: PrimitiveType,
+    ) -> Result<Value, MalformedMessage> {
         Ok(match kind {
-            Primitive::F64 => Value::Float(f64::from_le_bytes(self.bytes_at(at)?)),
-            Primitive::F32 => Value::Float(f32::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::Bool | Primitive::U8 => {
+            PrimitiveType::F64 => Value::Float(f64::from_le_bytes(self.bytes_at(at)?)),
+            PrimitiveType::F32 => Value::Float(f32::from_le_bytes(self.bytes_at(at)?).into()),
+            PrimitiveType::Bool | PrimitiveType::U8 => {
                 Value::Int(u8::from_le_bytes(self.bytes_at(at)?).into())
             }
-            Primitive::I8 => Value::Int(i8::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::U16 => Value::Int(u16::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::I16 => Value::Int(i16::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::U32 => Value::Int(u32::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::I32 => Value::Int(i32::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::U64 => Value::Unsigned(u64::from_le_bytes(self.bytes_at(at)?)),
-            Primitive::I64 => Value::Int(i64::from_le_bytes(self.bytes_at(at)?)),
+            PrimitiveType::I8 => Value::Int(i8::from_le_bytes(self.bytes_at(at)?).into()),
+            PrimitiveType::U16 => Value::Int(u16::from_le_bytes(self.bytes_at(at)?).into()),
+            PrimitiveType::I16 => Value::Int(i16::from_le_bytes(self.bytes_at(at)?).into()),
+            PrimitiveType::U32 => Value::Int(u32::from_le_bytes(self.bytes_at(at)?).into()),
+            PrimitiveType::I32 => Value::Int(i32::from_le_bytes(self.bytes_at(at)?).into()),
+            PrimitiveType::U64 => Value::Unsigned(u64::from_le_bytes(self.bytes_at(at)?)),
+            PrimitiveType::I64 => Value::Int(i64::from_le_bytes(self.bytes_at(at)?)),
         })
     }
 
@@ -134,11 +139,11 @@ impl<'d> Cursor<'d> {
     }
 
     /// Number of elements of a field; refused where fewer bytes than elements are left.
-    pub(super) fn count(&mut self, count: Count) -> Result<usize, MalformedMessage> {
+    pub(super) fn count(&mut self, count: ElementCount) -> Result<usize, MalformedMessage> {
         let count = match count {
-            Count::One => return Ok(1),
-            Count::Fixed(count) => count,
-            Count::Sequence => self.length()?,
+            ElementCount::One => return Ok(1),
+            ElementCount::Fixed(count) => count,
+            ElementCount::Sequence => self.length()?,
         };
         if count > self.data.len().saturating_sub(self.at) {
             return Err(MalformedMessage::Count(count));
@@ -165,7 +170,7 @@ impl<'d> Cursor<'d> {
     pub(super) fn primitives(
         &mut self,
         count: usize,
-        kind: Primitive,
+        kind: PrimitiveType,
     ) -> Result<ByteSpan, MalformedMessage> {
         if count > 0 {
             self.align_to(kind.size());

@@ -6,13 +6,14 @@
 
 use std::collections::BTreeMap;
 
-use super::wire::{Broken, Fields, Item, elements};
+use super::wire::{BrokenBytes, WireFields, WireValue, elements};
 
 /// Messages inside messages inside ..., deepest.
 const MAX_DEPTH: usize = 64;
 
+/// The message types of a schema, and which of them its messages have.
 #[derive(Debug, Clone)]
-pub(super) struct Types {
+pub(super) struct MessageTypes {
     pub(super) messages: Vec<MessageType>,
     /// Index of the type that was asked for.
     pub(super) root: usize,
@@ -32,12 +33,13 @@ pub(super) struct FieldType {
     pub(super) repeated: bool,
     /// Not written where it is 0.
     pub(super) zero_if_absent: bool,
-    pub(super) kind: Kind,
+    pub(super) kind: FieldKind,
 }
 
+/// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Number(Number),
+pub(super) enum FieldKind {
+    Number(NumberType),
     Text,
     /// A message of this type.
     Message(usize),
@@ -45,8 +47,9 @@ pub(super) enum Kind {
     Other,
 }
 
+/// The types of numbers of a protobuf field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Number {
+pub(super) enum NumberType {
     Double,
     Float,
     Int32,
@@ -63,32 +66,32 @@ pub(super) enum Number {
 }
 
 /// A field with the name of its type, which is not looked up yet.
-type Unresolved = (FieldType, Option<String>);
+type UnresolvedType = (FieldType, Option<String>);
 
 /// All types of a set, by their full name.
 #[derive(Default)]
-struct Found {
+struct TypeSet {
     names: BTreeMap<String, usize>,
-    messages: Vec<(Vec<Unresolved>, bool)>,
+    messages: Vec<(Vec<UnresolvedType>, bool)>,
 }
 
-impl Types {
+impl MessageTypes {
     pub(super) fn parse(name: &str, set: &[u8]) -> Result<Self, String> {
-        let damaged = |_: Broken| "its descriptor set is damaged".to_owned();
-        let mut found = Found::default();
-        for field in Fields::new(set) {
-            if let (1, Item::Bytes(file)) = field.map_err(damaged)? {
+        let damaged = |_: BrokenBytes| "its descriptor set is damaged".to_owned();
+        let mut found = TypeSet::default();
+        for field in WireFields::new(set) {
+            if let (1, WireValue::Bytes(file)) = field.map_err(damaged)? {
                 found.add_file(file).map_err(damaged)?;
             }
         }
         let full = format!(".{}", name.trim_start_matches('.'));
         let root = found.names.get(&full).copied();
         let root = root.ok_or_else(|| format!("its descriptor set does not define {name}"))?;
-        let Found { names, messages } = found;
-        let resolve = |(mut field, type_name): Unresolved| {
-            if matches!(field.kind, Kind::Message(_)) {
+        let TypeSet { names, messages } = found;
+        let resolve = |(mut field, type_name): UnresolvedType| {
+            if matches!(field.kind, FieldKind::Message(_)) {
                 let found = type_name.and_then(|name| names.get(&name).copied());
-                field.kind = found.map_or(Kind::Other, Kind::Message);
+                field.kind = found.map_or(FieldKind::Other, FieldKind::Message);
             }
             field
         };
@@ -104,32 +107,33 @@ impl Types {
     }
 }
 
-impl Found {
+impl TypeSet {
     /// `FileDescriptorProto`: package 2, messages 4, options 8, syntax 12, edition 14.
-    fn add_file(&mut self, file: &[u8]) -> Result<(), Broken> {
+    fn add_file(&mut self, file: &[u8]) -> Result<(), BrokenBytes> {
         let mut package = String::new();
         // whether fields are left out where they are 0
         let mut implicit = false;
-        for field in Fields::new(file) {
+        for field in WireFields::new(file) {
             match field? {
-                (2, Item::Bytes(name)) => package = format!(".{}", text(name)),
-                (12, Item::Bytes(syntax)) => implicit |= syntax == b"proto3",
-                (8, Item::Bytes(options)) => ask_presence(options, 50, &mut implicit)?,
+                (2, WireValue::Bytes(name)) => package = format!(".{}", text(name)),
+                (12, WireValue::Bytes(syntax)) => implicit |= syntax == b"proto3",
+                (8, WireValue::Bytes(options)) => ask_presence(options, 50, &mut implicit)?,
                 _ => {}
             }
         }
         let mut waiting: Vec<(String, &[u8], usize)> = Vec::new();
-        let messages = |scope: &str, data, tag, depth, to: &mut Vec<_>| -> Result<(), Broken> {
-            for field in Fields::new(data) {
-                if let (number, Item::Bytes(message)) = field?
-                    && number == tag
-                    && depth < MAX_DEPTH
-                {
-                    to.push((scope.to_owned(), message, depth));
+        let messages =
+            |scope: &str, data, tag, depth, to: &mut Vec<_>| -> Result<(), BrokenBytes> {
+                for field in WireFields::new(data) {
+                    if let (number, WireValue::Bytes(message)) = field?
+                        && number == tag
+                        && depth < MAX_DEPTH
+                    {
+                        to.push((scope.to_owned(), message, depth));
+                    }
                 }
-            }
-            Ok(())
-        };
+                Ok(())
+            };
         messages(&package, file, 4, 0, &mut waiting)?;
         while let Some((scope, message, depth)) = waiting.pop() {
             let full = self.add_message(&scope, message, implicit)?;
@@ -144,15 +148,15 @@ impl Found {
         scope: &str,
         message: &[u8],
         implicit: bool,
-    ) -> Result<String, Broken> {
+    ) -> Result<String, BrokenBytes> {
         let (mut full, mut fields, mut is_map_entry) = (String::new(), Vec::new(), false);
-        for field in Fields::new(message) {
+        for field in WireFields::new(message) {
             match field? {
-                (1, Item::Bytes(name)) => full = format!("{scope}.{}", text(name)),
-                (2, Item::Bytes(field)) => fields.push(field_type(field, implicit)?),
-                (7, Item::Bytes(options)) => {
-                    for option in Fields::new(options) {
-                        is_map_entry |= matches!(option?, (7, Item::Varint(1..)));
+                (1, WireValue::Bytes(name)) => full = format!("{scope}.{}", text(name)),
+                (2, WireValue::Bytes(field)) => fields.push(field_type(field, implicit)?),
+                (7, WireValue::Bytes(options)) => {
+                    for option in WireFields::new(options) {
+                        is_map_entry |= matches!(option?, (7, WireValue::Varint(1..)));
                     }
                 }
                 _ => {}
@@ -167,11 +171,11 @@ impl Found {
 }
 
 /// Takes from field `features` of options, a `FeatureSet`, its field_presence 1: explicit 1, implicit 2, required 3.
-fn ask_presence(options: &[u8], features: u32, implicit: &mut bool) -> Result<(), Broken> {
+fn ask_presence(options: &[u8], features: u32, implicit: &mut bool) -> Result<(), BrokenBytes> {
     for set in elements(options, features) {
-        if let Item::Bytes(set) = set? {
+        if let WireValue::Bytes(set) = set? {
             for presence in elements(set, 1) {
-                if let Item::Varint(presence) = presence? {
+                if let WireValue::Varint(presence) = presence? {
                     *implicit = presence == 2;
                 }
             }
@@ -181,39 +185,39 @@ fn ask_presence(options: &[u8], features: u32, implicit: &mut bool) -> Result<()
 }
 
 /// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9, proto3_optional 17.
-fn field_type(field: &[u8], mut implicit: bool) -> Result<Unresolved, Broken> {
+fn field_type(field: &[u8], mut implicit: bool) -> Result<UnresolvedType, BrokenBytes> {
     let (mut name, mut type_name) = (String::new(), None);
     let (mut number, mut label, mut kind, mut chosen) = (0, 1, 0, false);
-    for item in Fields::new(field) {
+    for item in WireFields::new(field) {
         match item? {
-            (1, Item::Bytes(text_of)) => name = text(text_of),
-            (3, Item::Varint(value)) => number = u32::try_from(value).unwrap_or(0),
-            (4, Item::Varint(value)) => label = value,
-            (5, Item::Varint(value)) => kind = value,
-            (6, Item::Bytes(name)) => type_name = Some(text(name)),
-            (8, Item::Bytes(options)) => ask_presence(options, 21, &mut implicit)?,
-            (9, Item::Varint(_)) | (17, Item::Varint(1..)) => chosen = true,
+            (1, WireValue::Bytes(text_of)) => name = text(text_of),
+            (3, WireValue::Varint(value)) => number = u32::try_from(value).unwrap_or(0),
+            (4, WireValue::Varint(value)) => label = value,
+            (5, WireValue::Varint(value)) => kind = value,
+            (6, WireValue::Bytes(name)) => type_name = Some(text(name)),
+            (8, WireValue::Bytes(options)) => ask_presence(options, 21, &mut implicit)?,
+            (9, WireValue::Varint(_)) | (17, WireValue::Varint(1..)) => chosen = true,
             _ => {}
         }
     }
     let kind = match kind {
-        1 => Kind::Number(Number::Double),
-        2 => Kind::Number(Number::Float),
-        3 => Kind::Number(Number::Int64),
-        4 => Kind::Number(Number::Uint64),
+        1 => FieldKind::Number(NumberType::Double),
+        2 => FieldKind::Number(NumberType::Float),
+        3 => FieldKind::Number(NumberType::Int64),
+        4 => FieldKind::Number(NumberType::Uint64),
         // An enumeration is a number too.
-        5 | 14 => Kind::Number(Number::Int32),
-        6 => Kind::Number(Number::Fixed64),
-        7 => Kind::Number(Number::Fixed32),
-        8 => Kind::Number(Number::Bool),
-        9 => Kind::Text,
-        11 if type_name.is_some() => Kind::Message(0),
-        13 => Kind::Number(Number::Uint32),
-        15 => Kind::Number(Number::Sfixed32),
-        16 => Kind::Number(Number::Sfixed64),
-        17 => Kind::Number(Number::Sint32),
-        18 => Kind::Number(Number::Sint64),
-        _ => Kind::Other,
+        5 | 14 => FieldKind::Number(NumberType::Int32),
+        6 => FieldKind::Number(NumberType::Fixed64),
+        7 => FieldKind::Number(NumberType::Fixed32),
+        8 => FieldKind::Number(NumberType::Bool),
+        9 => FieldKind::Text,
+        11 if type_name.is_some() => FieldKind::Message(0),
+        13 => FieldKind::Number(NumberType::Uint32),
+        15 => FieldKind::Number(NumberType::Sfixed32),
+        16 => FieldKind::Number(NumberType::Sfixed64),
+        17 => FieldKind::Number(NumberType::Sint32),
+        18 => FieldKind::Number(NumberType::Sint64),
+        _ => FieldKind::Other,
     };
     let repeated = label == 3;
     let field = FieldType {

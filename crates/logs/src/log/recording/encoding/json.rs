@@ -4,13 +4,13 @@ use serde_json::Value as Json;
 
 use super::leaves::{Tree, of_tree};
 use crate::log::json_text::parsed;
-use crate::log::recording::message::{Leaf, MessageReader, OpenedReader, Schema, Uneven};
+use crate::log::recording::message::{FieldLeaf, MessageReader, OpenedReader, Schema, UnevenArray};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
 struct JsonReader {
     fields: Vec<Vec<FieldPath>>,
-    uneven: Option<Uneven>,
+    uneven: Option<UnevenArray>,
 }
 
 /// Messages in JSON, whatever their schema.
@@ -43,11 +43,11 @@ impl MessageReader for JsonReader {
         }
     }
 
-    fn uneven(&self) -> Option<Uneven> {
+    fn uneven(&self) -> Option<UnevenArray> {
         self.uneven.clone()
     }
 
-    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
+    fn leaves(&self, data: &[u8]) -> Vec<FieldLeaf> {
         parsed(data).map_or_else(|_| Vec::new(), |root| of_tree(&tree(&root)))
     }
 }
@@ -81,7 +81,11 @@ fn number(value: &Json) -> Value {
 }
 
 /// Follows a path; elements that are named are looked up beside their array, then further out.
-fn find<'j>(root: &'j Json, steps: &[PathStep], uneven: &mut Option<Uneven>) -> Option<&'j Json> {
+fn find<'j>(
+    root: &'j Json,
+    steps: &[PathStep],
+    uneven: &mut Option<UnevenArray>,
+) -> Option<&'j Json> {
     let mut at = root;
     let mut outer = vec![root];
     for (place, step) in steps.iter().enumerate() {
@@ -104,7 +108,7 @@ fn find<'j>(root: &'j Json, steps: &[PathStep], uneven: &mut Option<Uneven>) -> 
                             if let Some(PathStep::Field(array)) = field
                                 && !elements.is_empty()
                             {
-                                *uneven = Some(Uneven {
+                                *uneven = Some(UnevenArray {
                                     array: array.clone(),
                                     numbers: elements.len(),
                                     names: names.len(),
@@ -130,7 +134,10 @@ mod tests {
         "name": ["a", "b"], "arm": {"position": [1, 2.5]},
         "joints": [{"id": "x", "q": -1}, {"id": "y", "q": 7}], "deep/key": {"~": [[4]]}}"#;
 
-    fn read<const N: usize>(text: &[u8], fields: [&[&str]; N]) -> ([Value; N], Option<Uneven>) {
+    fn read<const N: usize>(
+        text: &[u8],
+        fields: [&[&str]; N],
+    ) -> ([Value; N], Option<UnevenArray>) {
         let parse = |paths: &[&str]| paths.iter().map(|path| FieldPath::parse(path)).collect();
         let mut reader = JsonReader {
             fields: fields.map(parse).to_vec(),

@@ -1,8 +1,8 @@
 //! Every number of one message with the path that leads to it, whatever the encoding.
 
-use super::cursor::{Cursor, Encoding, MalformedMessage};
-use super::msg::{Count, ElementType, Field};
-use crate::log::recording::message::{Leaf, MOST_LEAVES, name_elements};
+use super::cursor::{ByteCursor, Encoding, MalformedMessage};
+use super::msg::{ElementCount, ElementType, Field};
+use crate::log::recording::message::{FieldLeaf, MOST_LEAVES, name_elements};
 use crate::log::recording::path::{FieldPath, PathStep};
 
 /// What a message holds, as far as numbers and the texts that name them go.
@@ -19,7 +19,7 @@ pub(super) enum Tree {
 /// Fields that are a time and no channel.
 const TIMES: [&str; 4] = ["header", "stamp", "timestamp", "layout"];
 
-pub(super) fn of_tree(tree: &Tree) -> Vec<Leaf> {
+pub(super) fn of_tree(tree: &Tree) -> Vec<FieldLeaf> {
     let mut out = Vec::new();
     collect(tree, ("", ""), &mut Vec::new(), &mut out);
     out
@@ -82,13 +82,13 @@ fn collect<'t>(
     tree: &'t Tree,
     (path, label): (&str, &str),
     lists: &mut Vec<(&'t str, &'t [String])>,
-    out: &mut Vec<Leaf>,
+    out: &mut Vec<FieldLeaf>,
 ) {
     if out.len() >= MOST_LEAVES {
         return;
     }
     match tree {
-        Tree::Number => out.push(Leaf {
+        Tree::Number => out.push(FieldLeaf {
             path: path.to_owned(),
             label: label.to_owned(),
         }),
@@ -98,7 +98,7 @@ fn collect<'t>(
                 let name = names.and_then(|names: &[String]| names.get(index));
                 // a bracket ends the name in a path
                 let by_name = list.zip(name.filter(|name| !name.contains(']')));
-                out.push(Leaf {
+                out.push(FieldLeaf {
                     path: match by_name {
                         Some((list, name)) => format!("{path}[{list}={name}]"),
                         None => format!("{path}[{index}]"),
@@ -172,14 +172,14 @@ fn own_name(element: &Tree) -> Option<(&str, &str)> {
 }
 
 /// The numbers of a CDR message; those before its end where it is cut off.
-pub(super) fn leaves(messages: &[Vec<Field>], encoding: Encoding, data: &[u8]) -> Vec<Leaf> {
+pub(super) fn leaves(messages: &[Vec<Field>], encoding: Encoding, data: &[u8]) -> Vec<FieldLeaf> {
     of_tree(&tree(messages, encoding, data))
 }
 
 /// What a CDR message holds.
 pub(super) fn tree(messages: &[Vec<Field>], encoding: Encoding, data: &[u8]) -> Tree {
     let mut fields = Vec::new();
-    if let Ok(mut cursor) = Cursor::new(data, encoding) {
+    if let Ok(mut cursor) = ByteCursor::new(data, encoding) {
         // what was read before the message broke off stands
         let _ = message(messages, 0, &mut cursor, &mut fields);
     }
@@ -213,12 +213,12 @@ pub(super) fn names_of(tree: &Tree) -> u64 {
 fn message(
     messages: &[Vec<Field>],
     number: usize,
-    cursor: &mut Cursor<'_>,
+    cursor: &mut ByteCursor<'_>,
     out: &mut Vec<(String, Tree)>,
 ) -> Result<(), MalformedMessage> {
     for field in &messages[number] {
         let count = cursor.count(field.count)?;
-        let one = field.count == Count::One;
+        let one = field.count == ElementCount::One;
         let tree = match field.kind {
             ElementType::Primitive(kind) => {
                 cursor.primitives(count, kind)?;

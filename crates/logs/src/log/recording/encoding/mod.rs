@@ -20,9 +20,9 @@ use super::message::{OpenedReader, Schema};
 use super::path::FieldPath;
 
 /// Makes a reader of some fields, for each the paths that it may have; `None` for a schema of another encoding.
-type Open = fn(&Schema, &[Vec<FieldPath>]) -> Option<OpenedReader>;
+type ReaderFactory = fn(&Schema, &[Vec<FieldPath>]) -> Option<OpenedReader>;
 
-const ENCODINGS: [Open; 3] = [cdr::open, json::open, proto::open];
+const ENCODINGS: [ReaderFactory; 3] = [cdr::open, json::open, proto::open];
 
 /// Makes a reader for `fields` of messages: for each the paths that it may have.
 pub(super) fn reader_of(schema: &Schema, fields: &[Vec<FieldPath>]) -> OpenedReader {
@@ -37,9 +37,9 @@ pub(super) fn reader_of(schema: &Schema, fields: &[Vec<FieldPath>]) -> OpenedRea
 
 /// Readers of some fields, one for each schema that was met.
 #[derive(Default)]
-pub(super) struct Readers(Vec<(Arc<Schema>, OpenedReader)>);
+pub(super) struct SchemaReaders(Vec<(Arc<Schema>, OpenedReader)>);
 
-impl Readers {
+impl SchemaReaders {
     pub(super) fn of(
         &mut self,
         schema: &Arc<Schema>,

@@ -7,8 +7,9 @@ const MAX_DEPTH: usize = 32;
 /// Bytes of definition text that are read.
 const MAX_DEFINITION_BYTES: usize = 1 << 20;
 
+/// The types of fields that are no messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Primitive {
+pub(super) enum PrimitiveType {
     Bool,
     I8,
     U8,
@@ -22,7 +23,7 @@ pub(super) enum Primitive {
     F64,
 }
 
-impl Primitive {
+impl PrimitiveType {
     /// Size, and alignment, in bytes.
     pub(super) const fn size(self) -> usize {
         match self {
@@ -54,15 +55,16 @@ impl Primitive {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ElementType {
-    Primitive(Primitive),
+    Primitive(PrimitiveType),
     String,
     WideString,
-    /// Index into [`Messages`].
+    /// Index into [`MessageFields`].
     Message(usize),
 }
 
+/// How many elements a field has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Count {
+pub(super) enum ElementCount {
     One,
     Fixed(usize),
     Sequence,
@@ -72,11 +74,11 @@ pub(super) enum Count {
 pub(super) struct Field {
     pub(super) name: String,
     pub(super) kind: ElementType,
-    pub(super) count: Count,
+    pub(super) count: ElementCount,
 }
 
 /// The fields of a message type and of every type that it needs; the first one is the message itself.
-pub(super) type Messages = Vec<Vec<Field>>;
+pub(super) type MessageFields = Vec<Vec<Field>>;
 
 /// Definitions that recordings may leave out: some recorders store type names alone.
 const KNOWN: [(&str, &str); 9] = [
@@ -111,14 +113,14 @@ const KNOWN: [(&str, &str); 9] = [
 struct UnresolvedField<'t> {
     name: &'t str,
     of: &'t str,
-    count: Count,
+    count: ElementCount,
 }
 
 /// The fields of each type, by its name.
-type Sections<'t> = BTreeMap<String, Vec<UnresolvedField<'t>>>;
+type TypeSections<'t> = BTreeMap<String, Vec<UnresolvedField<'t>>>;
 
 /// Parses the definition of message `name` (`package/msg/Type`), empty for a known type, and resolves every type in it.
-pub(super) fn parse(name: &str, text: &str) -> Result<Messages, String> {
+pub(super) fn parse(name: &str, text: &str) -> Result<MessageFields, String> {
     if text.len() > MAX_DEFINITION_BYTES {
         return Err(format!(
             "the definition is {} bytes long, more than {MAX_DEFINITION_BYTES}",
@@ -126,7 +128,7 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Messages, String> {
         ));
     }
     let root = short(name);
-    let mut sections = Sections::new();
+    let mut sections = TypeSections::new();
     for (name, known) in KNOWN {
         read_sections(name, known, &mut sections)?;
     }
@@ -143,7 +145,11 @@ pub(super) fn parse(name: &str, text: &str) -> Result<Messages, String> {
 }
 
 /// Reads the fields of message `name`, and of the messages that follow it in the text.
-fn read_sections<'t>(name: &str, text: &'t str, sections: &mut Sections<'t>) -> Result<(), String> {
+fn read_sections<'t>(
+    name: &str,
+    text: &'t str,
+    sections: &mut TypeSections<'t>,
+) -> Result<(), String> {
     let mut current = name.to_owned();
     sections.insert(current.clone(), Vec::new());
     for (index, line) in text.lines().enumerate() {
@@ -198,13 +204,13 @@ fn field<'t>(
         return Ok(None);
     }
     let (of, count) = match of.split_once('[') {
-        None => (of, Count::One),
+        None => (of, ElementCount::One),
         Some((of, size)) => {
             let size = size.strip_suffix(']').ok_or_else(refuse)?;
             let count = match size.parse() {
-                _ if size.is_empty() || size.starts_with("<=") => Count::Sequence,
+                _ if size.is_empty() || size.starts_with("<=") => ElementCount::Sequence,
                 // An element takes bytes, so that no count outlasts the message; none would not.
-                Ok(count) if count > 0 => Count::Fixed(count),
+                Ok(count) if count > 0 => ElementCount::Fixed(count),
                 _ => return Err(refuse()),
             };
             (of, count)
@@ -222,9 +228,9 @@ fn field<'t>(
 fn resolve(
     name: &str,
     root: &str,
-    sections: &Sections<'_>,
+    sections: &TypeSections<'_>,
     numbers: &mut BTreeMap<String, usize>,
-    messages: &mut Messages,
+    messages: &mut MessageFields,
     depth: usize,
 ) -> Result<usize, String> {
     let known = numbers.get(name).copied();
@@ -245,7 +251,7 @@ fn resolve(
         let kind = match field.of {
             "string" => ElementType::String,
             "wstring" => ElementType::WideString,
-            other => match Primitive::named(other) {
+            other => match PrimitiveType::named(other) {
                 Some(primitive) => ElementType::Primitive(primitive),
                 None => {
                     let full = full_name(other, name, sections);
@@ -265,8 +271,8 @@ fn resolve(
         // In CDR a message without fields still takes one byte.
         fields.push(Field {
             name: String::new(),
-            kind: ElementType::Primitive(Primitive::U8),
-            count: Count::One,
+            kind: ElementType::Primitive(PrimitiveType::U8),
+            count: ElementCount::One,
         });
     }
     messages[number] = fields;
@@ -274,7 +280,7 @@ fn resolve(
 }
 
 /// Name under which a type is defined: as it stands, in the package of the message, or the header.
-fn full_name(name: &str, inside: &str, sections: &Sections<'_>) -> Option<String> {
+fn full_name(name: &str, inside: &str, sections: &TypeSections<'_>) -> Option<String> {
     let package = inside.split_once('/').map(|(package, _)| package);
     let candidates = [
         Some(short(name)),
@@ -309,12 +315,24 @@ mod tests {
         let outer = &parse("p/msg/Outer", text).unwrap()[0];
         let kinds: Vec<_> = (outer.iter().map(|f| (&*f.name, f.kind, f.count))).collect();
         let expected = [
-            ("count", ElementType::Primitive(Primitive::I32), Count::One),
-            ("label", ElementType::String, Count::One),
-            ("v", ElementType::Primitive(Primitive::F32), Count::Fixed(3)),
-            ("w", ElementType::Primitive(Primitive::F64), Count::Sequence),
-            ("list", ElementType::Message(1), Count::Sequence),
-            ("wide", ElementType::WideString, Count::One),
+            (
+                "count",
+                ElementType::Primitive(PrimitiveType::I32),
+                ElementCount::One,
+            ),
+            ("label", ElementType::String, ElementCount::One),
+            (
+                "v",
+                ElementType::Primitive(PrimitiveType::F32),
+                ElementCount::Fixed(3),
+            ),
+            (
+                "w",
+                ElementType::Primitive(PrimitiveType::F64),
+                ElementCount::Sequence,
+            ),
+            ("list", ElementType::Message(1), ElementCount::Sequence),
+            ("wide", ElementType::WideString, ElementCount::One),
         ];
         assert_eq!(kinds, expected);
     }

@@ -1,47 +1,49 @@
 //! Which numbers are taken from the messages of one type: field paths resolved against its definition.
 
-use super::msg::{Count, ElementType, Field, Primitive};
+use super::msg::{ElementCount, ElementType, Field, PrimitiveType};
 use crate::log::recording::path::PathStep;
 
 #[derive(Debug, Clone, Default)]
-pub(super) struct Walkthrough {
-    pub(super) root: Node,
-    pub(super) picks: Vec<Pick>,
+pub(super) struct MessagePlan {
+    pub(super) root: PlanNode,
+    pub(super) picks: Vec<ElementPick>,
     /// Type of the elements of each array that is remembered.
-    pub(super) arrays: Vec<Primitive>,
+    pub(super) arrays: Vec<PrimitiveType>,
     /// Number of lists of names that are remembered.
     pub(super) lists: usize,
 }
 
 /// What is taken from a message: its fields in order, those of no interest left out.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Node {
-    pub(super) slots: Vec<(usize, Slot)>,
+pub(super) struct PlanNode {
+    pub(super) slots: Vec<(usize, PlanSlot)>,
 }
 
+/// What is taken from a field, and to which outputs it goes.
 #[derive(Debug, Clone)]
-pub(super) enum Slot {
+pub(super) enum PlanSlot {
     /// A number for this output.
     Number(Vec<usize>),
     /// An array of numbers, remembered under this index.
     Array(usize),
     /// A list of texts, remembered under this index.
     List(usize),
-    Inner(Node),
+    Inner(PlanNode),
     /// Some elements of an array of messages.
-    Elements(Vec<(usize, Node)>),
+    Elements(Vec<(usize, PlanNode)>),
 }
 
 /// An element of an array for one output.
 #[derive(Debug, Clone)]
-pub(super) struct Pick {
+pub(super) struct ElementPick {
     pub(super) output: usize,
     pub(super) array: usize,
-    pub(super) by: By,
+    pub(super) by: ElementSelector,
 }
 
+/// Which element of an array is meant: by its index, or by its name in a list beside it.
 #[derive(Debug, Clone)]
-pub(super) enum By {
+pub(super) enum ElementSelector {
     Index(usize),
     Name {
         list: usize,
@@ -53,19 +55,20 @@ pub(super) enum By {
 
 /// A step on the way to a number: into a field, or into an element of an array of messages.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Hop {
+enum PathHop {
     Field(usize),
     Element(usize),
 }
 
-enum End {
+/// Where the way to a number ends.
+enum PathEnd {
     Number,
-    Element(usize, Primitive),
+    Element(usize, PrimitiveType),
     /// An element by its name: the route to the list of names.
-    Named(Vec<Hop>, String, Primitive),
+    Named(Vec<PathHop>, String, PrimitiveType),
 }
 
-impl Walkthrough {
+impl MessagePlan {
     /// Adds the number at the end of a path to the plan; false where the path leads to none.
     pub(super) fn add(
         &mut self,
@@ -77,37 +80,38 @@ impl Walkthrough {
             return false;
         };
         let (by, kind) = match end {
-            End::Number => {
-                let slot = slot(&mut self.root, &hops, || Slot::Number(Vec::new()));
-                if let Slot::Number(outputs) = slot {
+            PathEnd::Number => {
+                let slot = slot(&mut self.root, &hops, || PlanSlot::Number(Vec::new()));
+                if let PlanSlot::Number(outputs) = slot {
                     outputs.push(output);
                 }
                 return true;
             }
-            End::Element(index, kind) => (By::Index(index), kind),
-            End::Named(list, name, kind) => {
+            PathEnd::Element(index, kind) => (ElementSelector::Index(index), kind),
+            PathEnd::Named(list, name, kind) => {
                 let next = self.lists;
-                let Slot::List(list) = slot(&mut self.root, &list, || Slot::List(next)) else {
+                let PlanSlot::List(list) = slot(&mut self.root, &list, || PlanSlot::List(next))
+                else {
                     return true;
                 };
                 let (list, last) = (*list, 0);
                 self.lists += usize::from(list == next);
-                (By::Name { list, name, last }, kind)
+                (ElementSelector::Name { list, name, last }, kind)
             }
         };
         let next = self.arrays.len();
-        if let Slot::Array(array) = slot(&mut self.root, &hops, || Slot::Array(next)) {
+        if let PlanSlot::Array(array) = slot(&mut self.root, &hops, || PlanSlot::Array(next)) {
             let array = *array;
             if array == next {
                 self.arrays.push(kind);
             }
-            self.picks.push(Pick { output, array, by });
+            self.picks.push(ElementPick { output, array, by });
         }
         true
     }
 }
 
-fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<(Vec<Hop>, End)> {
+fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<(Vec<PathHop>, PathEnd)> {
     let mut hops = Vec::new();
     let mut inside = 0;
     let mut steps = steps.iter().peekable();
@@ -118,10 +122,10 @@ fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<(Vec<Hop>, End)>
             return None;
         };
         let (index, field) = find_field(&messages[inside], name)?;
-        hops.push(Hop::Field(index));
+        hops.push(PathHop::Field(index));
         let selector = match field.count {
-            Count::One => None,
-            Count::Fixed(_) | Count::Sequence => Some(steps.next()?),
+            ElementCount::One => None,
+            ElementCount::Fixed(_) | ElementCount::Sequence => Some(steps.next()?),
         };
         let number = match selector {
             None => None,
@@ -133,10 +137,11 @@ fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<(Vec<Hop>, End)>
                 };
                 let list = outer.iter().rev().find_map(|(message, depth)| {
                     let (index, field) = find_field(&messages[*message], list)?;
-                    let texts = field.kind == ElementType::String && field.count != Count::One;
-                    texts.then(|| [&hops[..*depth], &[Hop::Field(index)]].concat())
+                    let texts =
+                        field.kind == ElementType::String && field.count != ElementCount::One;
+                    texts.then(|| [&hops[..*depth], &[PathHop::Field(index)]].concat())
                 })?;
-                let end = End::Named(list, value.clone(), kind);
+                let end = PathEnd::Named(list, value.clone(), kind);
                 return steps.next().is_none().then_some((hops, end));
             }
         };
@@ -144,13 +149,13 @@ fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<(Vec<Hop>, End)>
             ElementType::String | ElementType::WideString => return None,
             ElementType::Primitive(kind) => {
                 let end = match number {
-                    None => End::Number,
-                    Some(number) => End::Element(number, kind),
+                    None => PathEnd::Number,
+                    Some(number) => PathEnd::Element(number, kind),
                 };
                 return steps.next().is_none().then_some((hops, end));
             }
             ElementType::Message(message) => {
-                hops.extend(number.map(Hop::Element));
+                hops.extend(number.map(PathHop::Element));
                 inside = message;
                 outer.push((message, hops.len()));
             }
@@ -163,33 +168,37 @@ fn find_field<'f>(fields: &'f [Field], name: &str) -> Option<(usize, &'f Field)>
 }
 
 /// The slot at the end of some hops, made where there is none.
-fn slot<'n>(node: &'n mut Node, hops: &[Hop], new: impl FnOnce() -> Slot) -> &'n mut Slot {
-    let [Hop::Field(field), rest @ ..] = hops else {
+fn slot<'n>(
+    node: &'n mut PlanNode,
+    hops: &[PathHop],
+    new: impl FnOnce() -> PlanSlot,
+) -> &'n mut PlanSlot {
+    let [PathHop::Field(field), rest @ ..] = hops else {
         // hops begin with a field, and an element is followed by one
         return node.entry(0, new);
     };
     match rest {
         [] => node.entry(*field, new),
-        [Hop::Element(element), rest @ ..] => {
-            let elements = match node.entry(*field, || Slot::Elements(Vec::new())) {
-                Slot::Elements(elements) => elements,
+        [PathHop::Element(element), rest @ ..] => {
+            let elements = match node.entry(*field, || PlanSlot::Elements(Vec::new())) {
+                PlanSlot::Elements(elements) => elements,
                 other => return other,
             };
             let at = elements.partition_point(|(index, _)| index < element);
             if elements.get(at).is_none_or(|(index, _)| index != element) {
-                elements.insert(at, (*element, Node::default()));
+                elements.insert(at, (*element, PlanNode::default()));
             }
             slot(&mut elements[at].1, rest, new)
         }
-        rest => match node.entry(*field, || Slot::Inner(Node::default())) {
-            Slot::Inner(inner) => slot(inner, rest, new),
+        rest => match node.entry(*field, || PlanSlot::Inner(PlanNode::default())) {
+            PlanSlot::Inner(inner) => slot(inner, rest, new),
             other => other,
         },
     }
 }
 
-impl Node {
-    fn entry(&mut self, field: usize, new: impl FnOnce() -> Slot) -> &mut Slot {
+impl PlanNode {
+    fn entry(&mut self, field: usize, new: impl FnOnce() -> PlanSlot) -> &mut PlanSlot {
         let at = self.slots.partition_point(|(index, _)| *index < field);
         if self.slots.get(at).is_none_or(|(index, _)| *index != field) {
             self.slots.insert(at, (field, new()));

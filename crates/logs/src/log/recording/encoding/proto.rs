@@ -5,12 +5,12 @@
 
 use std::cell::RefCell;
 
-use super::descriptor::{FieldType, Kind, MessageType, Number, Types};
+use super::descriptor::{FieldKind, FieldType, MessageType, MessageTypes, NumberType};
 use super::elements::{count, field, number_of, packed_number, text_is};
 use super::leaves::{Tree, of_tree};
-use super::wire::{Broken, Fields, Item, elements};
+use super::wire::{BrokenBytes, WireFields, WireValue, elements};
 use crate::log::recording::message::{
-    Leaf, MOST_LEAVES, MessageReader, OpenedReader, Schema, Uneven,
+    FieldLeaf, MOST_LEAVES, MessageReader, OpenedReader, Schema, UnevenArray,
 };
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
@@ -29,15 +29,15 @@ pub(super) fn open(schema: &Schema, fields: &[Vec<FieldPath>]) -> Option<OpenedR
 
 #[derive(Debug)]
 struct ProtoReader {
-    types: Types,
+    types: MessageTypes,
     fields: Vec<Vec<FieldPath>>,
     /// An array of the last message that does not fit its list of names.
-    uneven: RefCell<Option<Uneven>>,
+    uneven: RefCell<Option<UnevenArray>>,
 }
 
 /// Where a path has come to.
 #[derive(Clone, Copy)]
-enum Place<'m> {
+enum PathPlace<'m> {
     Message(&'m [u8], &'m MessageType),
     /// All elements of a field of the message.
     Elements(&'m [u8], &'m FieldType),
@@ -48,8 +48,8 @@ enum Place<'m> {
 impl MessageReader for ProtoReader {
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
         self.uneven.replace(None);
-        let broken = |_: Broken| "it is no protobuf message, or is cut off".to_owned();
-        for field in Fields::new(data) {
+        let broken = |_: BrokenBytes| "it is no protobuf message, or is cut off".to_owned();
+        for field in WireFields::new(data) {
             field.map_err(broken)?;
         }
         for (paths, out) in self.fields.iter().zip(out) {
@@ -69,11 +69,11 @@ impl MessageReader for ProtoReader {
         root.fields.iter().map(|field| field.name.clone()).collect()
     }
 
-    fn uneven(&self) -> Option<Uneven> {
+    fn uneven(&self) -> Option<UnevenArray> {
         self.uneven.borrow().clone()
     }
 
-    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
+    fn leaves(&self, data: &[u8]) -> Vec<FieldLeaf> {
         of_tree(&self.tree(data, self.types.root, 0))
     }
 }
@@ -81,60 +81,66 @@ impl MessageReader for ProtoReader {
 impl ProtoReader {
     fn new(name: &str, set: &[u8], fields: &[Vec<FieldPath>]) -> Result<Self, String> {
         Ok(Self {
-            types: Types::parse(name, set)?,
+            types: MessageTypes::parse(name, set)?,
             fields: fields.to_vec(),
             uneven: RefCell::default(),
         })
     }
 
     /// Follows a path; elements that are named are looked up beside their array, then further out.
-    fn find(&self, data: &[u8], steps: &[PathStep]) -> Result<Value, Broken> {
+    fn find(&self, data: &[u8], steps: &[PathStep]) -> Result<Value, BrokenBytes> {
         if steps.len() > MAX_PATH_STEPS {
             return Ok(Value::Absent);
         }
         // Places on the way.
-        let mut way = [Place::Nothing; MAX_PATH_STEPS + 1];
-        way[0] = Place::Message(data, &self.types.messages[self.types.root]);
+        let mut way = [PathPlace::Nothing; MAX_PATH_STEPS + 1];
+        way[0] = PathPlace::Message(data, &self.types.messages[self.types.root]);
         for (index, step) in steps.iter().enumerate() {
             // from nowhere every step leads nowhere
             way[index + 1] = self.go(&way[..=index], step)?;
         }
         Ok(match way[steps.len()] {
-            Place::Number(value) => value,
+            PathPlace::Number(value) => value,
             _ => Value::Absent,
         })
     }
 
     /// One step from the last place of the way.
-    fn go<'m>(&'m self, way: &[Place<'m>], step: &PathStep) -> Result<Place<'m>, Broken> {
+    fn go<'m>(
+        &'m self,
+        way: &[PathPlace<'m>],
+        step: &PathStep,
+    ) -> Result<PathPlace<'m>, BrokenBytes> {
         let Some(at) = way.last() else {
-            return Ok(Place::Nothing);
+            return Ok(PathPlace::Nothing);
         };
         match (at, step) {
-            (Place::Message(data, kind), PathStep::Field(name)) => match field(kind, name) {
-                None => Ok(Place::Nothing),
-                Some(field) if field.repeated => Ok(Place::Elements(data, field)),
+            (PathPlace::Message(data, kind), PathStep::Field(name)) => match field(kind, name) {
+                None => Ok(PathPlace::Nothing),
+                Some(field) if field.repeated => Ok(PathPlace::Elements(data, field)),
                 Some(field) => self.last(data, field),
             },
-            (Place::Elements(data, field), PathStep::Index(index)) => {
+            (PathPlace::Elements(data, field), PathStep::Index(index)) => {
                 self.element(data, field, *index)
             }
-            (Place::Elements(data, field), PathStep::Field(name)) => match self.map_entry(field) {
-                Some(entry) => self.map_value(data, field, entry, name),
-                None => match name.parse() {
-                    Ok(index) => self.element(data, field, index),
-                    Err(_) => Ok(Place::Nothing),
-                },
-            },
-            (Place::Elements(data, field), PathStep::Named { list, value }) => {
-                if let Kind::Message(kind) = field.kind {
+            (PathPlace::Elements(data, field), PathStep::Field(name)) => {
+                match self.map_entry(field) {
+                    Some(entry) => self.map_value(data, field, entry, name),
+                    None => match name.parse() {
+                        Ok(index) => self.element(data, field, index),
+                        Err(_) => Ok(PathPlace::Nothing),
+                    },
+                }
+            }
+            (PathPlace::Elements(data, field), PathStep::Named { list, value }) => {
+                if let FieldKind::Message(kind) = field.kind {
                     let kind = &self.types.messages[kind];
                     for element in elements(data, field.number) {
-                        let Item::Bytes(element) = element? else {
+                        let WireValue::Bytes(element) = element? else {
                             continue;
                         };
                         if text_is(element, kind, list, value)? {
-                            return Ok(Place::Message(element, kind));
+                            return Ok(PathPlace::Message(element, kind));
                         }
                     }
                 }
@@ -142,52 +148,56 @@ impl ProtoReader {
                     if let Some((index, names)) = named(place, list, value)? {
                         let numbers = count(data, field)?;
                         if numbers != names {
-                            self.uneven.replace((numbers > 0).then(|| Uneven {
+                            self.uneven.replace((numbers > 0).then(|| UnevenArray {
                                 array: field.name.clone(),
                                 numbers,
                                 names,
                             }));
-                            return Ok(Place::Nothing);
+                            return Ok(PathPlace::Nothing);
                         }
                         return match index {
                             Some(index) => self.element(data, field, index),
-                            None => Ok(Place::Nothing),
+                            None => Ok(PathPlace::Nothing),
                         };
                     }
                 }
-                Ok(Place::Nothing)
+                Ok(PathPlace::Nothing)
             }
-            _ => Ok(Place::Nothing),
+            _ => Ok(PathPlace::Nothing),
         }
     }
 
     /// A field that stands there once.
-    fn last<'m>(&'m self, data: &'m [u8], field: &'m FieldType) -> Result<Place<'m>, Broken> {
+    fn last<'m>(
+        &'m self,
+        data: &'m [u8],
+        field: &'m FieldType,
+    ) -> Result<PathPlace<'m>, BrokenBytes> {
         let mut found = match (field.zero_if_absent, field.kind) {
-            (true, Kind::Number(Number::Double | Number::Float)) => {
-                Place::Number(Value::Float(0.0))
+            (true, FieldKind::Number(NumberType::Double | NumberType::Float)) => {
+                PathPlace::Number(Value::Float(0.0))
             }
-            (true, Kind::Number(_)) => Place::Number(Value::Int(0)),
-            _ => Place::Nothing,
+            (true, FieldKind::Number(_)) => PathPlace::Number(Value::Int(0)),
+            _ => PathPlace::Nothing,
         };
         for item in elements(data, field.number) {
             match self.place(field.kind, item?) {
-                Place::Nothing => {}
+                PathPlace::Nothing => {}
                 place => found = place,
             }
         }
         Ok(found)
     }
 
-    fn place<'m>(&'m self, kind: Kind, item: Item<'m>) -> Place<'m> {
+    fn place<'m>(&'m self, kind: FieldKind, item: WireValue<'m>) -> PathPlace<'m> {
         match (kind, item) {
-            (Kind::Number(number), item) => {
-                number_of(number, item).map_or(Place::Nothing, Place::Number)
+            (FieldKind::Number(number), item) => {
+                number_of(number, item).map_or(PathPlace::Nothing, PathPlace::Number)
             }
-            (Kind::Message(kind), Item::Bytes(data)) => {
-                Place::Message(data, &self.types.messages[kind])
+            (FieldKind::Message(kind), WireValue::Bytes(data)) => {
+                PathPlace::Message(data, &self.types.messages[kind])
             }
-            _ => Place::Nothing,
+            _ => PathPlace::Nothing,
         }
     }
 
@@ -197,13 +207,13 @@ impl ProtoReader {
         data: &'m [u8],
         field: &'m FieldType,
         index: usize,
-    ) -> Result<Place<'m>, Broken> {
+    ) -> Result<PathPlace<'m>, BrokenBytes> {
         let mut left = index;
         for item in elements(data, field.number) {
             let item = item?;
-            if let (Kind::Number(kind), Item::Bytes(packed)) = (field.kind, item) {
+            if let (FieldKind::Number(kind), WireValue::Bytes(packed)) = (field.kind, item) {
                 match packed_number(kind, packed, &mut left)? {
-                    Some(value) => return Ok(Place::Number(value)),
+                    Some(value) => return Ok(PathPlace::Number(value)),
                     None => continue,
                 }
             }
@@ -212,7 +222,7 @@ impl ProtoReader {
             }
             left -= 1;
         }
-        Ok(Place::Nothing)
+        Ok(PathPlace::Nothing)
     }
 
     /// What a message of a type holds, as far as it can be read.
@@ -223,11 +233,11 @@ impl ProtoReader {
         let of_field = |field: &FieldType| {
             let items = || elements(data, field.number).map_while(Result::ok);
             match (field.kind, field.repeated) {
-                (Kind::Number(_), false) => Tree::Number,
-                (Kind::Number(_), true) => Tree::Numbers(count(data, field).unwrap_or(0)),
-                (Kind::Text, repeated) => {
+                (FieldKind::Number(_), false) => Tree::Number,
+                (FieldKind::Number(_), true) => Tree::Numbers(count(data, field).unwrap_or(0)),
+                (FieldKind::Text, repeated) => {
                     let text = |item| match item {
-                        Item::Bytes(text) => String::from_utf8_lossy(text).into_owned(),
+                        WireValue::Bytes(text) => String::from_utf8_lossy(text).into_owned(),
                         _ => String::new(),
                     };
                     let texts: Vec<String> = items().map(text).collect();
@@ -236,9 +246,9 @@ impl ProtoReader {
                         false => Tree::Text(texts.into_iter().next().unwrap_or_default()),
                     }
                 }
-                (Kind::Message(inner), repeated) => {
+                (FieldKind::Message(inner), repeated) => {
                     let message = |item| match item {
-                        Item::Bytes(data) => self.tree(data, inner, depth + 1),
+                        WireValue::Bytes(data) => self.tree(data, inner, depth + 1),
                         _ => Tree::Nothing,
                     };
                     let mut all: Vec<Tree> = items().take(MOST_LEAVES).map(message).collect();
@@ -247,7 +257,7 @@ impl ProtoReader {
                         false => all.pop().unwrap_or(Tree::Nothing),
                     }
                 }
-                (Kind::Other, _) => Tree::Nothing,
+                (FieldKind::Other, _) => Tree::Nothing,
             }
         };
         let fields = self.types.messages[number].fields.iter();
@@ -256,7 +266,7 @@ impl ProtoReader {
 
     /// The type of a map's entries; `None` for a field that is no map.
     fn map_entry(&self, field: &FieldType) -> Option<&MessageType> {
-        let Kind::Message(kind) = field.kind else {
+        let FieldKind::Message(kind) = field.kind else {
             return None;
         };
         Some(&self.types.messages[kind]).filter(|kind| kind.is_map_entry)
@@ -269,13 +279,13 @@ impl ProtoReader {
         map: &'m FieldType,
         entry: &'m MessageType,
         key: &str,
-    ) -> Result<Place<'m>, Broken> {
+    ) -> Result<PathPlace<'m>, BrokenBytes> {
         let Some(value) = field(entry, "value") else {
-            return Ok(Place::Nothing);
+            return Ok(PathPlace::Nothing);
         };
-        let mut found = Place::Nothing;
+        let mut found = PathPlace::Nothing;
         for item in elements(data, map.number) {
-            if let Item::Bytes(item) = item?
+            if let WireValue::Bytes(item) = item?
                 && text_is(item, entry, "key", key)?
             {
                 found = self.last(item, value)?;
@@ -287,19 +297,19 @@ impl ProtoReader {
 
 /// Where `value` stands in the list of texts `list` of a message, and how many it has; `None` without such a list.
 fn named(
-    place: &Place<'_>,
+    place: &PathPlace<'_>,
     list: &str,
     value: &str,
-) -> Result<Option<(Option<usize>, usize)>, Broken> {
-    let Place::Message(data, kind) = place else {
+) -> Result<Option<(Option<usize>, usize)>, BrokenBytes> {
+    let PathPlace::Message(data, kind) = place else {
         return Ok(None);
     };
-    let Some(field) = field(kind, list).filter(|f| f.kind == Kind::Text && f.repeated) else {
+    let Some(field) = field(kind, list).filter(|f| f.kind == FieldKind::Text && f.repeated) else {
         return Ok(None);
     };
     let (mut found, mut names) = (None, 0);
     for item in elements(data, field.number) {
-        if item? == Item::Bytes(value.as_bytes()) && found.is_none() {
+        if item? == WireValue::Bytes(value.as_bytes()) && found.is_none() {
             found = Some(names);
         }
         names += 1;

@@ -13,8 +13,10 @@ use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, params};
 use tempfile::TempDir;
 
-use crate::log::content::{Compression, Content};
-use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, is_wanted};
+use crate::log::content::{CompressionFormat, FileContent};
+use crate::log::recording::message::{
+    MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
+};
 use crate::log::{LogError, escape_whole, source};
 
 /// Messages that are asked of the database at once, and their bytes at which a page ends earlier.
@@ -42,13 +44,13 @@ struct BagFile {
     /// Time and number of the last message of the page.
     last: (i64, i64),
     ended: bool,
-    broken: Option<Break>,
+    broken: Option<RecordingBreak>,
     messages: u64,
 }
 
 pub(super) fn open(
     path: &Path,
-    content: Content,
+    content: FileContent,
     wanted: &[String],
 ) -> Result<Box<dyn MessageFile>, LogError> {
     let refuse = |reason: String| LogError::Database {
@@ -56,11 +58,11 @@ pub(super) fn open(
         reason: escape_whole(&reason.replace('\n', " ")),
     };
     let journal = match content.compression {
-        Compression::None => journal_of(path),
+        CompressionFormat::None => journal_of(path),
         _ => None,
     };
     let copy = match (&journal, content.compression) {
-        (None, Compression::None) => None,
+        (None, CompressionFormat::None) => None,
         _ => Some(copy_of(path, content, journal.as_ref())?),
     };
     let place = match &copy {
@@ -107,7 +109,7 @@ pub(super) fn open(
         page: Vec::new(),
         last: (i64::MIN, i64::MIN),
         ended: false,
-        broken: journal.map(|_| Break {
+        broken: journal.map(|_| RecordingBreak {
             reason: UNCLOSED.to_owned(),
             place: "after its last commit".to_owned(),
         }),
@@ -157,7 +159,7 @@ impl MessageFile for BagFile {
         &self.topics
     }
 
-    fn broken(&self) -> Option<&Break> {
+    fn broken(&self) -> Option<&RecordingBreak> {
         self.broken.as_ref()
     }
 
@@ -166,7 +168,7 @@ impl MessageFile for BagFile {
             // What is read of a page that breaks off is used.
             if let Err(error) = self.turn() {
                 self.ended = true;
-                self.broken = Some(Break {
+                self.broken = Some(RecordingBreak {
                     reason: error.to_string(),
                     place: format!("after {} of its messages", self.messages),
                 });
@@ -183,10 +185,11 @@ impl MessageFile for BagFile {
     }
 }
 
-type Topics = (Vec<Topic>, BTreeMap<i64, usize>);
+/// The topics of a bag, and the index of each by its number in the database.
+type BagTopics = (Vec<Topic>, BTreeMap<i64, usize>);
 
 /// Topics with the definitions of their types, which older databases do not hold.
-fn read_topics(connection: &Connection) -> Result<Topics, rusqlite::Error> {
+fn read_topics(connection: &Connection) -> Result<BagTopics, rusqlite::Error> {
     let mut definitions: BTreeMap<String, (String, String)> = BTreeMap::new();
     if let Ok(mut statement) = connection
         .prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
@@ -225,9 +228,9 @@ const JOURNALS: [(&str, &[u8]); 2] = [
 ];
 
 /// A journal in use beside a database, and the end of its name.
-type Journal = (PathBuf, &'static str);
+type BagJournal = (PathBuf, &'static str);
 
-fn journal_of(database: &Path) -> Option<Journal> {
+fn journal_of(database: &Path) -> Option<BagJournal> {
     JOURNALS.into_iter().find_map(|(ending, magic)| {
         let path = beside(database, ending);
         let mut first = Vec::new();
@@ -244,7 +247,11 @@ fn beside(database: &Path, ending: &str) -> PathBuf {
 }
 
 /// Copies a database into a folder of its own, decompressed (SQLite reads files only) and with its journal.
-fn copy_of(path: &Path, content: Content, journal: Option<&Journal>) -> Result<TempDir, LogError> {
+fn copy_of(
+    path: &Path,
+    content: FileContent,
+    journal: Option<&BagJournal>,
+) -> Result<TempDir, LogError> {
     let failed = |error: io::Error| source::failed(path, error);
     let largest = content.size.saturating_mul(LARGEST_RATIO) + (1 << 20);
     let folder = tempfile::tempdir().map_err(failed)?;

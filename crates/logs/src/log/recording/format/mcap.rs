@@ -14,8 +14,10 @@ use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::record::{CUT, ChannelRecord, MessageRecord, SchemaRecord};
-use crate::log::content::{Bytes, Compression, Content};
-use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, is_wanted};
+use crate::log::content::{CompressionFormat, ContentBytes, FileContent};
+use crate::log::recording::message::{
+    MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
+};
 use crate::log::{LogError, source};
 
 /// Bytes that are asked of the disk at once.
@@ -36,17 +38,17 @@ const UNCLOSED: &str = "the recorder did not close it, or the copy was cut off";
 
 struct McapFile {
     path: PathBuf,
-    input: Bytes,
+    input: ContentBytes,
     reader: LinearReader,
-    contents: Contents,
+    contents: McapContents,
     bytes: u64,
     /// Length of the file, where it is not compressed as a whole [bytes].
     size: Option<u64>,
     ended: bool,
-    broken: Option<Break>,
+    broken: Option<RecordingBreak>,
 }
 
-struct Contents {
+struct McapContents {
     wanted: Vec<String>,
     topics: Vec<Topic>,
     /// Channel by its number in the file: index of the topic, and whether it is wanted.
@@ -59,7 +61,7 @@ struct Contents {
 
 pub(super) fn open(
     path: &Path,
-    content: Content,
+    content: FileContent,
     wanted: &[String],
 ) -> Result<Box<dyn MessageFile>, LogError> {
     // No record can hold much more than the whole file does, however well it is compressed.
@@ -68,12 +70,12 @@ pub(super) fn open(
         .with_skip_end_magic(true)
         .with_validate_chunk_crcs(true)
         .with_record_length_limit(largest as usize);
-    let size = (content.compression == Compression::None).then_some(content.size);
+    let size = (content.compression == CompressionFormat::None).then_some(content.size);
     Ok(Box::new(McapFile {
         path: path.to_owned(),
         input: content.into_bytes(),
         reader: LinearReader::new_with_options(options),
-        contents: Contents {
+        contents: McapContents {
             wanted: wanted.to_vec(),
             topics: Vec::new(),
             channels: BTreeMap::new(),
@@ -93,7 +95,7 @@ impl MessageFile for McapFile {
         &self.contents.topics
     }
 
-    fn broken(&self) -> Option<&Break> {
+    fn broken(&self) -> Option<&RecordingBreak> {
         self.broken.as_ref()
     }
 
@@ -128,7 +130,7 @@ impl MessageFile for McapFile {
                 Some(Err(error)) => error.to_string(),
             };
             self.ended = true;
-            self.broken = Some(Break {
+            self.broken = Some(RecordingBreak {
                 reason,
                 place: match self.size {
                     Some(size) => format!("at byte {} of {size}", self.bytes),
@@ -159,7 +161,7 @@ impl McapFile {
     }
 }
 
-impl Contents {
+impl McapContents {
     /// Takes a record; a message of a wanted topic is handed out, its bytes in `data`.
     #[inline]
     fn take(

@@ -10,15 +10,16 @@ use std::path::Path;
 
 use super::message::MessageFile;
 use crate::log::LogError;
-use crate::log::content::Content;
+use crate::log::content::FileContent;
 
-type Open = fn(&Path, Content, &[String]) -> Result<Box<dyn MessageFile>, LogError>;
+/// Opens a recording of a format for the messages of some topics.
+type FormatOpener = fn(&Path, FileContent, &[String]) -> Result<Box<dyn MessageFile>, LogError>;
 
 pub(in crate::log) struct Format {
     magic: &'static [u8],
     /// End of a file's name, compression aside.
     pub(in crate::log) ending: &'static str,
-    pub(super) open: Open,
+    pub(super) open: FormatOpener,
 }
 
 pub(in crate::log) const FORMATS: [Format; 3] = [

@@ -8,8 +8,10 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::log::content::{Bytes, Content, unpacked_chunk};
-use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, is_wanted};
+use crate::log::content::{ContentBytes, FileContent, unpacked_chunk};
+use crate::log::recording::message::{
+    MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
+};
 use crate::log::{LogError, source};
 
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
@@ -24,7 +26,7 @@ const CONNECTION: u8 = 7;
 
 struct BagFile {
     path: PathBuf,
-    input: Bytes,
+    input: ContentBytes,
     topics: Vec<Topic>,
     /// Topic by the number of its connection, and whether it is wanted.
     connections: BTreeMap<u32, (usize, bool)>,
@@ -34,7 +36,7 @@ struct BagFile {
     at: usize,
     messages: u64,
     ended: bool,
-    broken: Option<Break>,
+    broken: Option<RecordingBreak>,
 }
 
 /// Why a record cannot be read.
@@ -47,7 +49,7 @@ enum RecordProblem {
 
 pub(super) fn open(
     path: &Path,
-    content: Content,
+    content: FileContent,
     wanted: &[String],
 ) -> Result<Box<dyn MessageFile>, LogError> {
     let mut input = content.into_bytes();
@@ -257,7 +259,7 @@ impl MessageFile for BagFile {
                 Err(RecordProblem::Damaged(reason)) => reason,
             };
             self.ended = true;
-            self.broken = Some(Break {
+            self.broken = Some(RecordingBreak {
                 reason,
                 place: format!("after {} of its messages", self.messages),
             });
@@ -265,7 +267,7 @@ impl MessageFile for BagFile {
         Ok(None)
     }
 
-    fn broken(&self) -> Option<&Break> {
+    fn broken(&self) -> Option<&RecordingBreak> {
         self.broken.as_ref()
     }
 }
