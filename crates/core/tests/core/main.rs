@@ -1,7 +1,12 @@
 //! Tests of physics, motion and estimators.
 
+mod diagnosis_bench;
+mod diagnosis_formulas;
+mod diagnosis_joints;
+mod diagnosis_principles;
 mod filter_principles;
 mod fit_principles;
+mod gains_principles;
 mod motion_accuracy;
 mod motion_measured;
 mod motion_time_base;
