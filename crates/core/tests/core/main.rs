@@ -10,6 +10,7 @@ mod effect_principles;
 mod filter_principles;
 mod fit_principles;
 mod gains_principles;
+mod judge_principles;
 mod motion_accuracy;
 mod motion_measured;
 mod motion_time_base;
