@@ -24,3 +24,4 @@ mod robot_oracle;
 mod robot_principles;
 mod robot_properties;
 mod robot_reference;
+mod validate_principles;
