@@ -18,11 +18,11 @@ const MASS: f64 = 1.7;
 /// Viscous and Coulomb friction of each joint.
 const FRICTION: [[f64; 2]; 2] = [[0.6, 1.1], [0.2, 0.5]];
 
-fn robot() -> Robot {
+pub fn robot() -> Robot {
     double_pendulum([0.0, -9.81, 0.0], false)
 }
 
-fn bodies() -> Vec<f64> {
+pub fn bodies() -> Vec<f64> {
     let upper = Body {
         mass: 3.0,
         centre: [0.2, 0.01, 0.0],
@@ -49,7 +49,7 @@ fn loaded_bodies() -> Vec<f64> {
     all
 }
 
-fn waves(first: f64) -> [Waves; 2] {
+pub fn waves(first: f64) -> [Waves; 2] {
     [
         vec![[0.9, 1.1 * first, 0.2], [0.4, 2.7 * first, 1.0]],
         vec![[0.8, 1.6 * first, 0.9], [0.5, 3.3 * first, 2.1]],
@@ -57,7 +57,7 @@ fn waves(first: f64) -> [Waves; 2] {
 }
 
 /// Rows of a motion, of which channel j counts `channel[j]` a unit of torque, with noise in the channels.
-fn rows(bodies: &[f64], waves: &[Waves; 2], channel: [f64; 2], noise: f64) -> BlockFactors {
+pub fn rows(bodies: &[f64], waves: &[Waves; 2], channel: [f64; 2], noise: f64) -> BlockFactors {
     let robot = robot();
     let theta = robot.base_of(bodies);
     let columns = RegressorColumns {

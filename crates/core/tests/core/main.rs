@@ -1,5 +1,6 @@
 //! Tests of physics, motion and estimators.
 
+mod consistent_principles;
 mod data_principles;
 mod diagnosis_bench;
 mod diagnosis_formulas;
