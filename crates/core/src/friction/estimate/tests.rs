@@ -1,6 +1,8 @@
+use super::super::prepare::{SensorModel, SmoothedMotion};
 use super::super::trial::FrictionTrial;
 use super::*;
 use crate::math::descent::IterationEnding;
+use crate::robot::{JointKind, Robot};
 
 fn run(
     trial: &FrictionTrial,
@@ -118,4 +120,50 @@ fn the_plateau_map_lies_on_the_curve() {
         let f = trial.law.torque(p.v);
         assert!((p.torque - f).abs() < 0.03 * f.abs(), "{p:?} {f}");
     }
+}
+
+#[test]
+fn what_another_smoothing_and_another_weight_of_the_encoder_change_is_in_the_deviations() {
+    let mut trial = FrictionTrial::usual();
+    trial.seconds = 6.0;
+    let motion = trial.motion(3);
+    // the same motion as a narrower filter would give it: a hundredth less of every acceleration
+    let mut narrower = motion.clone();
+    narrower.a.iter_mut().for_each(|a| *a *= 0.99);
+    let prepared = trial.prepared_of(motion.clone());
+    let robot = Robot::single_joint("q1", JointKind::Prismatic);
+    let variance = trial.step * trial.step / 12.0;
+    let sensors = SensorModel {
+        variance: &|_| variance,
+        zero_order_hold: true,
+    };
+    let with = |narrower: &SmoothedMotion| {
+        let inputs = FrictionInputs {
+            robot: &robot,
+            joint: 0,
+            motions: std::slice::from_ref(&motion),
+            narrower: std::slice::from_ref(narrower),
+            sensors: &sensors,
+        };
+        let names = ["inertia".to_owned()];
+        estimate(
+            "q1",
+            &names,
+            &prepared,
+            Some(&inputs),
+            &FrictionOptions::default(),
+        )
+        .unwrap()
+    };
+    let alone = of(&prepared, &FrictionOptions::default()).unwrap();
+    let (same, other) = (with(&motion), with(&narrower));
+    assert_eq!((same.law, other.law), (alone.law, alone.law));
+    assert_eq!(same.cutoffs, [f64::INFINITY]);
+    for k in 0..FRICTION {
+        let [alone, same] = [&alone, &same].map(|e| e.covariance[k][k]);
+        assert!(same >= alone * (1.0 - 1e-9), "{k}: {alone} {same}");
+    }
+    // an inertia is known to what another acceleration makes of it
+    let [own, changed] = [&same, &other].map(|e| e.nuisance[0].std);
+    assert!(changed >= own * (1.0 - 1e-9), "{own} {changed}");
 }
