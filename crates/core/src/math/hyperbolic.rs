@@ -11,7 +11,8 @@ pub fn tanh(x: f64) -> f64 {
     if x.abs() < 0.01 {
         return x.tanh();
     }
-    1.0 - 2.0 / (1.0 + (2.0 * x).exp())
+    // odd to the last bit
+    (1.0 - 2.0 / (1.0 + (2.0 * x.abs()).exp())).copysign(x)
 }
 
 #[cfg(test)]
@@ -23,6 +24,7 @@ mod tests {
         for i in -4000..=4000 {
             let x = f64::from(i) * 0.01;
             assert!((tanh(x) - x.tanh()).abs() < 4e-16, "{x}");
+            assert_eq!(tanh(-x), -tanh(x));
         }
         for x in [1e4, 20.0, 20.0_f64.next_down()] {
             assert_eq!((tanh(x), tanh(-x)), (1.0, -1.0));
