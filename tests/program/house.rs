@@ -27,8 +27,8 @@ const ROOMS: &[(&str, &str)] = &[
         "math robot block log config motion effect band export",
     ),
     ("open_loop", "explain math number robot motion effect"),
-    ("drive", "explain number verdict robot log"),
     ("judge", "math"),
+    ("drive", "explain number verdict robot judge log"),
     ("friction", "explain math robot block motion verdict"),
     ("inertia", "explain math robot block motion verdict judge"),
     (
@@ -46,8 +46,11 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     ("compare", "explain math robot config motion effect verdict"),
     ("track", ""),
-    ("tool", "explain number robot log config"),
-    ("held", "explain number verdict robot block log config tool"),
+    ("tool", "explain number robot judge log config"),
+    (
+        "held",
+        "explain number verdict robot block judge log config tool",
+    ),
     (
         "input",
         "explain math block verdict number robot log config motion effect friction inertia judge diagnose validate \

@@ -8,7 +8,7 @@
 //! [`friction::estimate::estimate`] find the numbers, [`diagnose::diagnose`] the effects, by the judge in [`judge`].
 //!
 //! ```
-//! use cft_ident_core::robot::cft::{Setup, Structure};
+//! use cft_ident_core::robot::cft::{LaboratorySetup, ParameterStructure};
 //! use cft_ident_core::robot::friction::ViscousCoulomb;
 //! use cft_ident_core::robot::model::{JointFriction, Model};
 //! use cft_ident_core::robot::{JointKind, Robot};
@@ -25,7 +25,7 @@
 //! assert!((tau[0] - (0.2 * 5.0 + 0.8 * 2.0 + 1.5)).abs() < 1e-12);
 //!
 //! // the CFT robot: torques are linear in its twelve inertial parameters
-//! let cft = Robot::cft(Setup::default(), Structure::default());
+//! let cft = Robot::cft(LaboratorySetup::default(), ParameterStructure::default());
 //! let mut y = vec![0.0; cft.joints() * cft.parameters().len()];
 //! cft.regressor(&[0.1; 4], &[0.2; 4], &[0.3; 4], &mut y);
 //! assert_eq!(y.len(), 4 * 12);

@@ -5,7 +5,7 @@
 //! [`mapping::look`] what its columns are where nobody has described them, [`output::LogWriter`] writes one.
 //!
 //! ```
-//! use cft_ident_logs::mapping::{Asked, look};
+//! use cft_ident_logs::mapping::{LogHints, look};
 //! use cft_ident_logs::log::LogSpec;
 //!
 //! let dir = tempfile::tempdir()?;
@@ -16,7 +16,7 @@
 //!     text += &format!("{t:.2},{:.6},{:.6}\n", t.sin(), 2.0 * t.cos());
 //! }
 //! std::fs::write(&file, text)?;
-//! let seen = look(&LogSpec::whole(&file), &Asked::default(), None, &|| false)?;
+//! let seen = look(&LogSpec::whole(&file), &LogHints::default(), None, &|| false)?;
 //! let units: Vec<_> = seen.columns.iter().filter_map(|column| column.unit.as_deref()).collect();
 //! assert_eq!(units, ["rad", "Nm"]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -1,8 +1,8 @@
 //! `actuator-friction`: friction in the actuator coordinates, tau = J' F(J v). On the CFT robot it
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
-use crate::math::hyperbolic::tanh;
 use super::{Entry, Family, Key, Law, PlaceRule, ShapeSearch, ShapeSpan, SpeedLadder, Unit};
+use crate::math::hyperbolic::tanh;
 use crate::robot::cft::pantograph::reference_jacobian;
 
 pub static ENTRY: Entry = Entry {

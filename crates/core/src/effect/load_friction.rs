@@ -1,10 +1,10 @@
 //! `load-friction`: friction that grows with the load, (mu_c + mu_v |v|) |tau_l| tanh(w v)
 //! (Hamon, Gautier and Garrec 2010).
 
-use crate::math::hyperbolic::tanh;
 use super::{
     CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan, Unit,
 };
+use crate::math::hyperbolic::tanh;
 use crate::number;
 
 pub static ENTRY: Entry = Entry {

@@ -1,11 +1,11 @@
 //! `smooth-coulomb`: friction that does not jump at rest. In place of the declared fc sgn(v) stands
 //! fc tanh(v/vs) (Andersson, Soderberg and Bjorklund 2007, eq. 2).
 
-use crate::math::hyperbolic::tanh;
 use super::{
     CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan,
     SpeedLadder, Unit, jumps_or_is_none,
 };
+use crate::math::hyperbolic::tanh;
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {

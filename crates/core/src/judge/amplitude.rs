@@ -8,6 +8,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Numbers;
 use super::bounded::{self, Bound};
+use super::jackknife::jackknife;
 use super::sums::{BlockSums, Term, Terms};
 
 /// Places of an effect's terms: its coefficients, and the slopes by which its shape is free.
@@ -127,20 +128,7 @@ impl JointFit {
 
     /// Covariance of all values: their scatter over fits without each block, and what was known before.
     pub fn covariance(&self) -> DMatrix<f64> {
-        let each = self.without.iter().map(|x| x - &self.values);
-        self.scatter(each) + &self.known
-    }
-
-    /// (n - 1) / n of the sum of squares: the variance of an estimate from those without each of n blocks.
-    fn scatter(&self, each: impl Iterator<Item = DVector<f64>>) -> DMatrix<f64> {
-        let (mut out, mut count) = (None, 0.0);
-        for off in each {
-            let out = out.get_or_insert_with(|| DMatrix::zeros(off.len(), off.len()));
-            out.ger(1.0, &off, &off, 1.0);
-            count += 1.0;
-        }
-        let out = out.unwrap_or_else(|| DMatrix::zeros(0, 0));
-        out * ((count - 1.0) / f64::max(count, 1.0))
+        jackknife(&self.values, &self.without) + &self.known
     }
 
     /// What the blocks say of an effect. `noisier` are the sums of all blocks with as much noise again in the
@@ -184,8 +172,8 @@ impl JointFit {
         let along =
             |x: &DVector<f64>| x.select_rows(&free) + &by_shape * x.select_rows(&effect.slopes);
         let amplitude = along(&self.values);
-        let off = self.without.iter().map(|x| along(x) - &amplitude);
-        let mut spread = self.scatter(off);
+        let without: Vec<DVector<f64>> = self.without.iter().map(along).collect();
+        let mut spread = jackknife(&amplitude, &without);
         let places: Vec<usize> = free.iter().chain(&effect.slopes).copied().collect();
         let known = self.known.select_rows(&places).select_columns(&places);
         let k = free.len();

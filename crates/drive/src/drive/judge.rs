@@ -3,8 +3,8 @@
 //! A block left out is one Newton step on the sums of the others. F = a^2 / V, and a step needs F above c, which chance
 //! exceeds as rarely as F(1, 23) exceeds 25 (Hotelling): s = max(0, 1 - c / F).
 
+use cft_ident_core::judge::{hotelling, hotelling_floor, jackknife, width_95};
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::fit::{PieceSums, solve_free};
 use super::unknown::DriveUnknown;
@@ -12,9 +12,6 @@ use super::unknown::DriveUnknown;
 /// The numbers that decide.
 #[derive(Debug, Clone, Copy)]
 pub struct JudgeNumbers {
-    /// Deviations of one number in 24 blocks that a step needs; other numbers of blocks as unlikely by chance. Half: noise
-    /// is written; twice: effects of a third of the error are passed over.
-    pub deviations: f64,
     /// From this s on a step is confirmed. Half: a step of seven deviations is; .9: the delay of a measured servo is not.
     pub confirmed: f64,
     /// Fewest blocks that judge. Half: four logs agree by chance; twice: a servo at three gains has too few.
@@ -29,25 +26,12 @@ pub struct JudgeNumbers {
 }
 
 pub const NUMBERS: JudgeNumbers = JudgeNumbers {
-    deviations: 5.0,
     confirmed: 0.8,
     blocks: 8,
     screen: 1.0,
     noticeable: 0.02,
     steps: 6,
 };
-
-/// c of k numbers in n blocks; infinite where n blocks do not suffice.
-pub fn floor(k: usize, n: f64) -> f64 {
-    let usual = FisherSnedecor::new(1.0, 23.0);
-    let squared = NUMBERS.deviations * NUMBERS.deviations;
-    let level = usual.map_or(0.0, |law| law.sf(squared));
-    let k = k as f64;
-    match FisherSnedecor::new(k, n - k) {
-        Ok(law) if n > k + 1.0 => (n - 1.0) / (n - k) * law.inverse_cdf(1.0 - level),
-        _ => f64::INFINITY,
-    }
-}
 
 /// Changes of the unknowns by each block left out.
 #[derive(Debug, Clone)]
@@ -72,9 +56,7 @@ impl BlockJackknife {
             .map(|i| total.h[(i, i)] > 0.0 && values[i] > bounds[i][0] && values[i] < bounds[i][1])
             .collect();
         let at: Vec<usize> = (0..p).filter(|i| free[*i]).collect();
-        let n = blocks.len() as f64;
         let mut changes = Vec::with_capacity(blocks.len());
-        let mut covariance = DMatrix::zeros(p, p);
         for block in blocks {
             let mut rest = total.clone();
             rest.h -= &block.h;
@@ -86,12 +68,11 @@ impl BlockJackknife {
                     change[*i] = (values[*i] + step).clamp(low, high) - values[*i];
                 }
             }
-            covariance += (n - 1.0) / n * &change * change.transpose();
             changes.push(change);
         }
         BlockJackknife {
+            covariance: jackknife(&DVector::zeros(p), &changes),
             changes,
-            covariance,
             free,
         }
     }
@@ -104,8 +85,7 @@ impl BlockJackknife {
 
     /// How far a 95 % interval reaches, in standard deviations.
     pub fn reach(&self) -> f64 {
-        let freedom = self.changes.len() as f64 - 1.0;
-        StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |law| law.inverse_cdf(0.975))
+        width_95(self.changes.len())
     }
 
     /// Loss of every block by the unknowns of the others.
@@ -131,16 +111,10 @@ impl JudgedDriveEffect {
     pub fn new(amplitude: &DVector<f64>, v: DMatrix<f64>, blocks: usize) -> Self {
         let k = amplitude.len();
         let floor = match blocks >= NUMBERS.blocks && k > 0 {
-            true => floor(k, blocks as f64),
+            true => hotelling_floor(k, blocks),
             false => f64::INFINITY,
         };
-        let sizes: Vec<f64> = (0..k).map(|i| v[(i, i)].sqrt()).collect();
-        let unit = DMatrix::from_fn(k, k, |a, b| v[(a, b)] / (sizes[a] * sizes[b]));
-        let scaled = DVector::from_fn(k, |a, _| amplitude[a] / sizes[a]);
-        let f = match unit.cholesky() {
-            Some(root) => scaled.dot(&root.solve(&scaled)) / k.max(1) as f64,
-            None => 0.0,
-        };
+        let f = hotelling(amplitude, &v);
         JudgedDriveEffect {
             deviations: f.sqrt(),
             floor,
@@ -168,23 +142,3 @@ pub fn gain(before: &[f64], after: &[f64]) -> [f64; 2] {
 
 /// Losses are not smaller, for logarithms.
 const TINY: f64 = 1e-12;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_floor_is_twenty_five_for_one_number_in_24_blocks_and_more_in_fewer() {
-        assert!((floor(1, 24.0) - 25.0).abs() < 1e-6);
-        for (k, n, expected) in [
-            (2, 24.0, 17.0),
-            (4, 24.0, 13.0),
-            (1, 12.0, 42.0),
-            (2, 12.0, 35.0),
-        ] {
-            let c = floor(k, n);
-            assert!((c - expected).abs() < 1.0, "{k} {n}: {c}");
-        }
-        assert!(floor(3, 3.0).is_infinite());
-    }
-}

@@ -410,11 +410,12 @@ impl DataFault {
             FindingKind::Sign | FindingKind::Order => effect::wrong_sign_or_order::ENTRY.name,
             other => other.word(),
         };
+        let decided = finding.decided().map(|by| format!("; decided by: {by}"));
         Self {
             kind: kind.to_owned(),
             channel: finding.joint.clone(),
             effect: finding.meaning.clone(),
-            remedy: format!("write {}", finding.remedy),
+            remedy: format!("write {}{}", finding.remedy, decided.unwrap_or_default()),
         }
     }
 }

@@ -129,7 +129,8 @@ impl SetupCondition {
             (SetupCriterion::Repaired, false) => {
                 format!("after the repair still {value} > {limit}")
             }
-            (SetupCriterion::Driven, _) => format!("friction or inertia of {name} cannot be"),
+            (SetupCriterion::Driven, true) => "some friction or inertia cannot be".to_owned(),
+            (SetupCriterion::Driven, false) => "all friction and inertia can be".to_owned(),
             (SetupCriterion::NotDriven, true) => {
                 "after the repair all friction and inertia can be".to_owned()
             }

@@ -10,7 +10,7 @@ use super::HELD;
 use super::check::HoldCheck;
 use super::error::HeldError;
 use super::holds::HeldLog;
-use crate::tool::{jackknife, width_95};
+use cft_ident_core::judge::{jackknife, width_95};
 use cft_ident_core::number;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 use cft_ident_files::config::RobotFile;

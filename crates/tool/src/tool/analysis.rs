@@ -12,9 +12,9 @@ use super::result::{
     TriedReading,
 };
 use super::search::{FoundEffects, JudgedEffect, fitted, nearest_turn, search, turn_in_numbers};
-use super::significance::{jackknife, width_95};
 use super::wrench_log::{PoseRow, WrenchLog, WrenchReading};
 use super::{GRAVITY, NUMBERS};
+use cft_ident_core::judge::{NUMBERS as JUDGE, jackknife, width_95};
 use cft_ident_core::number;
 use cft_ident_core::robot::tree::space::UNTURNED;
 use nalgebra::DMatrix;
@@ -479,7 +479,7 @@ impl ResultParts<'_> {
                 WrenchEffect::BiasDrift { degree } => Some(degree),
                 _ => None,
             },
-            deviations: NUMBERS.deviations * (f / step.statistic[1]).sqrt(),
+            deviations: JUDGE.deviations * (f / step.statistic[1]).sqrt(),
             shrinkage,
             size: place.map_or(0.0, |k| self.problem.size(after, k)),
             parameters,

@@ -8,8 +8,8 @@ use super::NUMBERS;
 use super::effect::WrenchEffect;
 use super::equations::{LinearisedAt, RowEquations};
 use super::physics::{BaseColumns, columns};
-use super::significance::jackknife;
 use super::wrench_log::{PoseRow, of_turn, turn_of};
+use cft_ident_core::judge::jackknife;
 use cft_ident_core::robot::tree::space::{UNTURNED, product};
 
 /// Rows of one way to read a log, and how much their equations weigh.

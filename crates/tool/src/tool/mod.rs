@@ -3,7 +3,7 @@
 //! ```text
 //! rows -> ways to read them (frame of the wrench, order of the quaternion), the best of which is named
 //!      -> least squares of 10 unknowns where the sensor is held, 16 where it moves   (physics, fit)
-//!      -> effects, each by the error on neighbours left out, then by its own deviation  (search, significance)
+//!      -> effects, each by the error on neighbours left out, then by its own deviation  (search)
 //!      -> what the poses do not determine, and the pose that would   (next_pose)
 //! ```
 
@@ -22,7 +22,6 @@ mod physics;
 mod read;
 mod result;
 mod search;
-mod significance;
 mod table;
 mod tool_file;
 mod units;
@@ -40,7 +39,6 @@ pub use result::{
     ForceMoment, ToolErrors, ToolForecast, ToolNumber, ToolResult, ToolStep, ToolVerdict,
     TriedReading,
 };
-pub use significance::{floor, jackknife, statistic, width_95};
 pub use tool_file::ToolFile;
 pub use units::ForceUnit;
 pub use words::{number_95, step_in_words};
@@ -59,8 +57,6 @@ pub struct WrenchNumbers {
     pub blocks: usize,
     /// Fewest blocks by which an effect is judged.
     pub fewest_blocks: usize,
-    /// Deviations that one number by 24 blocks must exceed to be no chance.
-    pub deviations: f64,
     /// From this s = 1 - floor / F on an effect is confirmed and written: it is a thing that a person can measure.
     pub confirmed: f64,
     /// An effect must lower the error on rows left out by so many standard errors.
@@ -106,7 +102,6 @@ pub const NUMBERS: WrenchNumbers = WrenchNumbers {
     neighbours: 10,
     blocks: 24,
     fewest_blocks: 8,
-    deviations: 5.0,
     confirmed: 0.8,
     screen: 2.0,
     noticeable: 0.02,

@@ -8,8 +8,8 @@ use super::effect::{DEGREES, WrenchEffect};
 use super::equations::LinearisedAt;
 use super::fit::{WrenchFit, WrenchProblem, blocks, held_out_blocks, mean_norms};
 use super::physics::{BaseColumns, felt};
-use super::significance::{floor, statistic};
 use super::wrench_log::turn_of;
+use cft_ident_core::judge::{hotelling, hotelling_floor};
 use cft_ident_core::robot::tree::space::UNTURNED;
 
 /// An effect with what was decided of it.
@@ -284,10 +284,10 @@ fn settled(problem: &WrenchProblem, steps: &mut [JudgedEffect]) -> WrenchFit {
                 fit.covariance[(asked[i], asked[j])]
             });
             let least = match count >= NUMBERS.fewest_blocks {
-                true => floor(asked.len(), count),
+                true => hotelling_floor(asked.len(), count),
                 false => f64::INFINITY,
             };
-            steps[*at].statistic = [statistic(&a, &v), least];
+            steps[*at].statistic = [hotelling(&a, &v), least];
             steps[*at].written = steps[*at].shrinkage() > NUMBERS.confirmed;
         }
         let over = |k: &usize| steps[*k].statistic[0] / steps[*k].statistic[1];

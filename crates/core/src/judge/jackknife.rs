@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 
 use super::NUMBERS;
 
-/// Covariance of estimates by the jackknife; one row of `left_out` per block.
+/// Covariance of estimates by the jackknife; one vector of `left_out` per block.
 pub fn jackknife(all: &DVector<f64>, left_out: &[DVector<f64>]) -> DMatrix<f64> {
     let n = left_out.len() as f64;
     let mut sum = DMatrix::zeros(all.len(), all.len());
@@ -16,7 +16,7 @@ pub fn jackknife(all: &DVector<f64>, left_out: &[DVector<f64>]) -> DMatrix<f64> 
         let off = without - all;
         sum.ger(1.0, &off, &off, 1.0);
     }
-    sum * ((n - 1.0) / n)
+    sum * ((n - 1.0) / n.max(1.0))
 }
 
 /// Half width of a 95 % interval in standard deviations, where a deviation rests on `blocks` blocks.
@@ -26,12 +26,13 @@ pub fn width_95(blocks: usize) -> f64 {
 }
 
 /// The F that `k` numbers whose deviation rests on `n` blocks must exceed: as rare by chance as
-/// [`NUMBERS`]`.deviations` of one number by 24 blocks. Infinite where the blocks are too few.
-pub fn floor(k: usize, n: usize) -> f64 {
+/// [`NUMBERS`]`.deviations` of one number by [`NUMBERS`]`.blocks`. Infinite where the blocks are too few.
+pub fn hotelling_floor(k: usize, n: usize) -> f64 {
     let (Some(rest), true) = (n.checked_sub(k).filter(|rest| *rest > 0), k > 0) else {
         return f64::INFINITY;
     };
-    let rarity = FisherSnedecor::new(1.0, 23.0).map(|f| f.sf(NUMBERS.deviations.powi(2)));
+    let usual = FisherSnedecor::new(1.0, NUMBERS.blocks as f64 - 1.0);
+    let rarity = usual.map(|f| f.sf(NUMBERS.deviations.powi(2)));
     let law = FisherSnedecor::new(k as f64, rest as f64);
     match (rarity, law) {
         (Ok(rarity), Ok(law)) => (n - 1) as f64 / rest as f64 * law.inverse_cdf(1.0 - rarity),
@@ -40,7 +41,7 @@ pub fn floor(k: usize, n: usize) -> f64 {
 }
 
 /// F = a' V^-1 a / k; 0 where V has no inverse.
-pub fn statistic(a: &DVector<f64>, v: &DMatrix<f64>) -> f64 {
+pub fn hotelling(a: &DVector<f64>, v: &DMatrix<f64>) -> f64 {
     // numbers of different units: each by its own deviation
     let scale = v.diagonal().map(|x| x.sqrt());
     if scale.iter().any(|s| *s <= 0.0 || !s.is_finite()) {
@@ -58,10 +59,10 @@ mod tests {
 
     #[test]
     fn one_number_by_24_blocks_needs_five_deviations_and_more_numbers_are_as_rare() {
-        let shown = |k, n| floor(k, n).round();
+        let shown = |k, n| hotelling_floor(k, n).round();
         assert_eq!([1, 2, 3, 4].map(|k| shown(k, 24)), [25.0, 17.0, 14.0, 13.0]);
         assert_eq!([1, 2, 3, 4].map(|k| shown(k, 12)), [42.0, 35.0, 38.0, 46.0]);
-        assert!(floor(24, 24).is_infinite() && floor(0, 24).is_infinite());
+        assert!(hotelling_floor(24, 24).is_infinite() && hotelling_floor(0, 24).is_infinite());
     }
 
     #[test]
