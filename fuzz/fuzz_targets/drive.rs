@@ -20,8 +20,9 @@ fuzz_target!(|data: &[u8]| {
         let cut = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
         let (control, state) = bytes.split_at(cut);
         std::fs::create_dir_all(&path).expect("the temporary folder can be made");
-        let files = [("control.csv", control), ("state_motor.csv", state)];
-        files.map(|(name, text)| std::fs::write(path.join(name), text).expect("the folder can be written"));
+        for (name, text) in [("control.csv", control), ("state_motor.csv", state)] {
+            std::fs::write(path.join(name), text).expect("the folder can be written");
+        }
     } else {
         std::fs::write(&path, bytes).expect("the temporary file can be written");
     }

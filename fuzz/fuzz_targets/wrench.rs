@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use cft_ident::tool::{WrenchRequest, read_wrenches};
+use cft_ident_tool::tool::{WrenchRequest, read_wrenches};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

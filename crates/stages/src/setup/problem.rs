@@ -314,7 +314,7 @@ impl<'a> Problem<'a> {
                 return None;
             }
         }
-        (good > 0 && 2 * good >= all).then(|| Rows {
+        (good > 0 && 2 * good >= all).then_some(Rows {
             count: good,
             total: part.sums,
             terms,
