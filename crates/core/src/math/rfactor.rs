@@ -35,8 +35,7 @@ pub struct RFactor {
     block: Vec<f64>,
     /// Rows that the block holds: its stride.
     stride: usize,
-    /// Place of the first number of each row that waits which is not zero: rows of a triangle are folded in a third of
-    /// the time.
+    /// Of each waiting row the column of its first entry that is not zero: what stands before it need not be reduced.
     first: Vec<usize>,
 }
 
@@ -192,7 +191,7 @@ fn in_order(first: &mut [usize], block: &mut [f64], stride: usize) {
 }
 
 /// Annihilates rows of the column-major `block`, whose columns begin `stride` apart, under the row-major `triangle`.
-/// Left of `first`, which goes up, the rows are zero.
+/// Row k is zero before column `first[k]`; `first` is sorted.
 fn reduce(first: &[usize], stride: usize, triangle: &mut [f64], block: &mut [f64]) {
     widest(FactorReduction {
         first,

@@ -1,6 +1,6 @@
 //! The plain fit and the physically consistent one on rows that neither has seen.
 
-use cft_ident_core::inertia::accumulate::BlockFactors;
+use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
 use cft_ident_core::inertia::feasible::ConsistencyProblem;
 use cft_ident_core::inertia::left_out::{FitsOnLeftOut, left_out};
 use cft_ident_core::inertia::solve::{RowWeighting, factor, fit, weights_of};
@@ -22,7 +22,8 @@ fn weights(factors: &BlockFactors) -> Vec<f64> {
     weights_of(factors, &plain.residual_std)
 }
 
-fn tried(factors: &BlockFactors) -> FitsOnLeftOut {
+/// Both fits on some of these parts left out, nothing known of bodies.
+fn tried_on(factors: &BlockFactors, parts: &[BlockFactor]) -> Option<FitsOnLeftOut> {
     let weights = weights(factors);
     let whole = factor(factors, &weights).expect("rows");
     let map = robot().standard_map();
@@ -33,10 +34,11 @@ fn tried(factors: &BlockFactors) -> FitsOnLeftOut {
         effective: 1.0,
         friction: &[],
     };
-    let found = left_out(factors, &factors.in_parts(), &weights, &task);
-    found
-        .expect("rows that determine all")
-        .expect("parts enough")
+    left_out(factors, parts, &weights, &task).expect("rows that determine all")
+}
+
+fn tried(factors: &BlockFactors) -> FitsOnLeftOut {
+    tried_on(factors, &factors.in_parts()).expect("parts enough")
 }
 
 /// Squared residual of each joint's rows of a part, by weighted least squares of all other parts from scratch.
@@ -113,17 +115,5 @@ fn torques_that_no_bodies_make_are_better_explained_without_them_on_other_logs_t
 #[test]
 fn too_few_parts_are_not_tried() {
     let factors = two_logs(&bodies());
-    let weights = weights(&factors);
-    let whole = factor(&factors, &weights).expect("rows");
-    let map = robot().standard_map();
-    let task = ConsistencyProblem {
-        map: &map,
-        bodies: &[None, None],
-        factor: &whole,
-        effective: 1.0,
-        friction: &[],
-    };
-    let parts = factors.in_parts();
-    let found = left_out(&factors, &parts[..3], &weights, &task);
-    assert!(found.expect("nothing is fitted").is_none());
+    assert!(tried_on(&factors, &factors.in_parts()[..3]).is_none());
 }

@@ -14,7 +14,8 @@ const COUNT: usize = 3000;
 /// Speed, acceleration and torque of one row.
 type Row = [f64; 3];
 
-fn columns() -> RegressorColumns {
+/// Columns of one joint whose rows count from this speed on.
+pub fn columns_of_one_joint(rest_speed: Vec<f64>) -> RegressorColumns {
     RegressorColumns {
         joints: 1,
         shared: 1,
@@ -24,8 +25,12 @@ fn columns() -> RegressorColumns {
             JointTerm::Offset,
         ]],
         known: vec![None],
-        rest_speed: Vec::new(),
+        rest_speed,
     }
+}
+
+fn columns() -> RegressorColumns {
+    columns_of_one_joint(Vec::new())
 }
 
 fn regressor([v, a, _]: &Row) -> [f64; 4] {

@@ -2,7 +2,7 @@
 
 use cft_ident_core::block::Block;
 use cft_ident_core::inertia::accumulate::{BlockFactors, RowAccumulator};
-use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
+use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::departure::widen_by_departure;
 use cft_ident_core::inertia::encoder::{PositionNoise, bias, correct, tells};
 use cft_ident_core::inertia::solve::{Fit, RowWeighting, fit};
@@ -13,23 +13,14 @@ use cft_ident_core::robot::{JointKind, Robot};
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnosis_bench::Chance;
+use crate::fit_principles::columns_of_one_joint;
 
 const STEP: f64 = 0.01;
 const ROWS: usize = 4000;
 const INERTIA: f64 = 1.3;
 
 fn columns() -> RegressorColumns {
-    RegressorColumns {
-        joints: 1,
-        shared: 1,
-        own: vec![vec![
-            JointTerm::Viscous,
-            JointTerm::Coulomb,
-            JointTerm::Offset,
-        ]],
-        known: vec![None],
-        rest_speed: vec![0.01],
-    }
+    columns_of_one_joint(vec![0.01])
 }
 
 fn motion(k: usize) -> [f64; 2] {

@@ -108,13 +108,13 @@ pub struct JudgedDriveEffect {
 
 impl JudgedDriveEffect {
     /// Of amplitudes with covariance V in so many blocks: F = a' V^-1 a / k.
-    pub fn new(amplitude: &DVector<f64>, v: DMatrix<f64>, blocks: usize) -> Self {
+    pub fn new(amplitude: &DVector<f64>, v: &DMatrix<f64>, blocks: usize) -> Self {
         let k = amplitude.len();
         let floor = match blocks >= NUMBERS.blocks && k > 0 {
             true => hotelling_floor(k, blocks),
             false => f64::INFINITY,
         };
-        let f = hotelling(amplitude, &v);
+        let f = hotelling(amplitude, v);
         JudgedDriveEffect {
             deviations: f.sqrt(),
             floor,

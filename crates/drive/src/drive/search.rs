@@ -385,7 +385,7 @@ fn judged(
     let v = DMatrix::from_fn(free.len(), free.len(), |a, b| {
         at.jackknife.covariance[(free[a], free[b])]
     });
-    let judged = JudgedDriveEffect::new(&amplitude, v, problem.blocks);
+    let judged = JudgedDriveEffect::new(&amplitude, &v, problem.blocks);
     let status = match judged.shrinkage {
         s if s > NUMBERS.confirmed => StepCertainty::Confirmed,
         s if s > 0.0 => StepCertainty::Indicated,
