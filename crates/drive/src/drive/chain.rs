@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use cft_ident_core::robot::Robot;
 
 use super::law::{DriveLawKind, MachineLaw};
-use super::roll_out::{PastStates, RolledDrive, first_speed, steps};
+use super::roll_out::{PastStates, RolledDrive, first_speeds, steps};
 use super::set_point::{CommandLines, SetPointFollower};
 use super::track::DriveLog;
 
@@ -90,24 +90,36 @@ impl RobotChains {
 
     /// Positions of all joints along a log, as the encoders would read them.
     pub fn roll(&self, log: &DriveLog, kind: DriveLawKind, law: &MachineLaw) -> Vec<Vec<f64>> {
+        let roll = |speeds: &[f64], count: usize| self.roll_from(log, (kind, law), speeds, count);
+        self.roll_from(log, (kind, law), &first_speeds(log, &roll), log.t.len())
+    }
+
+    /// The first so many positions from speeds at the first sample \[rad/s\].
+    fn roll_from(
+        &self,
+        log: &DriveLog,
+        (kind, law): (DriveLawKind, &MachineLaw),
+        speeds: &[f64],
+        count: usize,
+    ) -> Vec<Vec<f64>> {
         let n = self.robot.joints();
-        let mut out = vec![vec![0.0; log.t.len()]; n];
+        let mut out = vec![vec![0.0; count]; n];
         let Some(inertia) = self.inertia.get(&part_of(log)) else {
             return out;
         };
-        let t = &log.t;
+        let t = &log.t[..count];
         let late = law.command_delay + law.loop_delay;
         let joints = log.joints.iter().zip(&law.joints);
         let (mut q, mut v) = (vec![0.0; n], vec![0.0; n]);
         let mut sides = Vec::with_capacity(n);
         for (j, (track, of)) in joints.clone().enumerate() {
             q[j] = track.position[0] + of.bias;
-            v[j] = first_speed(t, &track.position);
+            v[j] = speeds[j];
             out[j][0] = track.position[0];
             sides.push(CommandSide {
-                command: CommandLines::new(t, &track.command, log.command_is, t[0] - late),
+                command: CommandLines::new(&log.t, &track.command, log.command_is, t[0] - late),
                 follower: SetPointFollower::new(track.command[0], of.slowness),
-                past: PastStates::new(law.loop_delay, q[j], v[j]),
+                past: PastStates::new(law.loop_delay, t[0], q[j], v[j]),
             });
         }
         let still = vec![0.0; n];
@@ -115,10 +127,10 @@ impl RobotChains {
         let mut work = KickWork::new(n);
         for k in 1..t.len() {
             let dt = t[k] - t[k - 1];
-            let count = steps(dt);
-            let h = dt / count as f64;
+            let parts = steps(dt);
+            let h = dt / parts as f64;
             let mass = &inertia[(k - 1) * n * n..k * n * n];
-            for i in 0..count {
+            for i in 0..parts {
                 let begin = t[k - 1] + i as f64 * h;
                 for j in 0..n {
                     q[j] += 0.5 * h * v[j];
@@ -129,7 +141,6 @@ impl RobotChains {
                 for (j, (track, of)) in joints.clone().enumerate() {
                     let side = &mut sides[j];
                     let end = begin + h - late;
-                    let set = side.follower.mean_up_to(&mut side.command, end);
                     let on = track.on.get(k - 1).copied().unwrap_or(true);
                     let supply = match (law.supply, track.supply.get(k - 1)) {
                         (Some(reference), Some(volts)) => volts / reference,
@@ -137,10 +148,11 @@ impl RobotChains {
                     };
                     let seen = side.past.seen(begin, h, q[j], v[j]);
                     let drive = RolledDrive::new(kind, of, [track.kp, track.kd], supply);
-                    let (tau, slope) = match on {
-                        true => drive.torque(set - (seen.q - of.bias), seen.v),
-                        false => (0.0, 0.0),
-                    };
+                    let ahead = (&mut side.follower, &mut side.command);
+                    let (mut tau, mut slope) = drive.mean_torque(ahead, (end, h), (seen, of.bias));
+                    if !on {
+                        (tau, slope) = (0.0, 0.0);
+                    }
                     let damping = if on { of.damping } else { of.viscous };
                     work.force[j] = tau + of.offset - bias[j] - damping * v[j];
                     work.added[j] = of.armature + 0.5 * h * (damping + slope * seen.own);

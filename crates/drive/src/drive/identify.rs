@@ -14,7 +14,7 @@ use super::search::{self, FoundDrive, LawEstimate, StepCertainty};
 use super::start;
 use super::track::median;
 use super::track::{DriveLoad, DriveLog};
-use super::unknown::{DriveQuantity, DriveUnknown, UnknownFrame};
+use super::unknown::{DriveUnknown, UnknownFrame};
 
 /// Logs by what they are for.
 #[derive(Debug, Clone)]
@@ -89,10 +89,17 @@ pub struct IdentifiedDrives {
     pub ratios: bool,
     pub before: DriveErrorsByUse,
     pub after: DriveErrorsByUse,
-    /// Armatures [kg m^2] with the other delay in the place of the one that is written, where data do not part them.
-    pub other_delay: Option<(DriveEffect, Vec<f64>)>,
+    /// Laws that these data do not tell from the one that is written.
+    pub others: Vec<OtherLaw>,
     /// Positions of some logs, held-out ones first.
     pub courses: Vec<PositionCourse>,
+}
+
+/// A law with another effect in the place of one that is written.
+#[derive(Debug, Clone)]
+pub struct OtherLaw {
+    pub effect: DriveEffect,
+    pub law: LawEstimate,
 }
 
 /// Positions along a log, joint after joint [rad].
@@ -171,7 +178,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
     doing("held-out data");
     let before = errors(&bare, &found.given, &held_out);
     let after = errors(&problem, &found.refined, &held_out);
-    let other_delay = other_delay(&problem, &found);
+    let others = other_laws(&problem, &mut found);
     let drawn = held_out.iter().map(|log| (true, *log));
     let drawn = drawn
         .chain(fitted.iter().map(|log| (false, *log)))
@@ -196,7 +203,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
         blocks,
         before,
         after,
-        other_delay,
+        others,
         courses,
     })
 }
@@ -425,17 +432,26 @@ fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
     }
 }
 
-/// The armature with the other delay, where data do not part the two.
-fn other_delay(problem: &DriveProblem, found: &FoundDrive) -> Option<(DriveEffect, Vec<f64>)> {
-    let delays = [DriveEffect::CommandDelay, DriveEffect::LoopDelay];
-    let step = found
-        .steps
-        .iter()
-        .find(|s| s.written() && delays.contains(&s.effect))?;
-    let other = step.alternatives.iter().find(|e| delays.contains(e))?;
-    let rest = search::without(problem, &found.refined, step.effect);
-    let with = search::with(problem, &rest, *other);
-    let of = |j| with.value(DriveUnknown::of(DriveQuantity::Armature, j));
-    let armatures: Option<Vec<f64>> = (0..problem.frame.joints).map(of).collect();
-    Some((*other, armatures?))
+/// The laws that do nearly as well in the end: a written effect exchanged for one that stood beside it when it joined.
+/// What stands in the model too, or does worse with everything else fitted, is no alternative.
+fn other_laws(problem: &DriveProblem, found: &mut FoundDrive) -> Vec<OtherLaw> {
+    let written: Vec<_> = found.steps.iter().filter(|step| step.written()).collect();
+    let written: Vec<DriveEffect> = written.iter().map(|step| step.effect).collect();
+    let (refined, mut laws) = (&found.refined, Vec::new());
+    for step in &mut found.steps {
+        let own = step.effect;
+        step.alternatives.retain(|other| {
+            if !written.contains(&own) || written.contains(other) {
+                return false;
+            }
+            let near = search::near_exchange(problem, refined, own, *other);
+            let is_near = near.is_some();
+            laws.extend(near.map(|law| OtherLaw {
+                effect: *other,
+                law,
+            }));
+            is_near
+        });
+    }
+    laws
 }

@@ -140,5 +140,10 @@ pub fn gain(before: &[f64], after: &[f64]) -> [f64; 2] {
     [mean, (spread / (n - 1.0) / n).sqrt()]
 }
 
+/// Whether a gain over another law, with its standard error, is none beyond chance: the two stand beside each other.
+pub fn is_near([gain, se]: [f64; 2]) -> bool {
+    gain < NUMBERS.screen * se
+}
+
 /// Losses are not smaller, for logarithms.
 const TINY: f64 = 1e-12;

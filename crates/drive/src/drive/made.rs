@@ -1,17 +1,16 @@
 //! What was identified -> [`DriveResult`].
 
 use cft_ident_core::number::{plus_minus, significant};
-use cft_ident_core::verdict::Verdict;
 
 use super::candidate::DriveEffect;
-use super::identify::{self, BlocksAre, DriveErrorsByUse, IdentifiedDrives};
+use super::identify::{self, BlocksAre, DriveErrorsByUse, IdentifiedDrives, OtherLaw};
 use super::law::DriveLawKind;
-use super::numbers::{given, parameter, part, step};
+use super::numbers::{given, in_figures, parameter, part, step};
 use super::outcome::{
-    DeclaredDrive, DriveParameter, DrivePositionError, DriveResult, DriveStep, DriveVerdict,
-    JointPositionError, LogPositionError, PositionErrorsByUse, StepAmplitude, TriedEffect,
-    VerdictKind,
+    DeclaredDrive, DrivePositionError, DriveResult, DriveStep, DriveVerdict, JointPositionError,
+    LogPositionError, PositionErrorsByUse, StepAmplitude, TriedEffect, VerdictKind,
 };
+use super::unknown::DriveUnknown;
 
 impl DriveResult {
     /// Of what was identified.
@@ -34,22 +33,21 @@ impl DriveResult {
         let at = &of.found.refined;
         let reach = at.jackknife.reach();
         for (i, (unknown, value)) in at.unknowns.iter().zip(&at.values).enumerate() {
-            let parameter = parameter(of, volts, *unknown, *value, at.jackknife.std(i), reach);
-            parameters.extend(parameter);
+            let own = at.jackknife.std(i);
+            let other = of.furthest_other(*unknown, *value);
+            // what another law says is as likely
+            let std = own.map(|own| own.hypot(other.map_or(0.0, |other| other.shift)));
+            let parameter = parameter(of, volts, *unknown, *value, std, reach);
+            parameters.extend(parameter.map(|mut parameter| {
+                let outside = |other: &FurthestOther| own.is_some_and(|s| other.shift > reach * s);
+                if let Some(other) = other.filter(outside) {
+                    parameter.meaning += &other.in_words(*unknown);
+                }
+                parameter
+            }));
         }
         for (unknown, value) in &of.frame.held {
             parameters.extend(parameter(of, volts, *unknown, *value, None, reach));
-        }
-        if let Some((other, armatures)) = &of.other_delay {
-            for (j, armature) in armatures.iter().enumerate() {
-                let own = parameters.iter_mut().find(|p: &&mut DriveParameter| {
-                    p.name == "armature" && p.joint.as_deref() == Some(&of.joints[j])
-                });
-                if let Some(own) = own {
-                    own.verdict = Verdict::NotIdentifiable;
-                    own.meaning += &format!("; {armature:.4} with {} in its place", other.name());
-                }
-            }
         }
         let given = given(&drive, &parameters);
         let steps: Vec<DriveStep> = of.found.steps.iter().map(|s| step(of, volts, s)).collect();
@@ -111,6 +109,40 @@ impl DriveResult {
         Some(out)
     }
 }
+
+/// What the law that differs most says of a number.
+#[derive(Clone, Copy)]
+struct FurthestOther {
+    effect: DriveEffect,
+    value: f64,
+    /// How far it is from the number that is written, in the unit of the fit.
+    shift: f64,
+}
+
+impl FurthestOther {
+    fn in_words(&self, unknown: DriveUnknown) -> String {
+        let value = in_figures(unknown.quantity, self.value);
+        format!("; {value} with {} in its place", self.effect.name())
+    }
+}
+
+impl IdentifiedDrives {
+    /// Of a number of the law that is written; none where there is no other law.
+    fn furthest_other(&self, unknown: DriveUnknown, value: f64) -> Option<FurthestOther> {
+        let of = |other: &OtherLaw| {
+            // a law without the number has none of it
+            let other_value = other.law.value(unknown).unwrap_or(0.0);
+            FurthestOther {
+                effect: other.effect,
+                value: other_value,
+                shift: (other_value - value).abs(),
+            }
+        };
+        let all = self.others.iter().map(of);
+        all.max_by(|a, b| a.shift.total_cmp(&b.shift))
+    }
+}
+
 fn by_use(of: &IdentifiedDrives, errors: &DriveErrorsByUse) -> PositionErrorsByUse {
     let one = |errors: &identify::DrivePositionErrors| DrivePositionError {
         mae: errors.mae(None),

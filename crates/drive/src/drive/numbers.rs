@@ -1,5 +1,6 @@
 //! Names, units and meanings of what was identified.
 
+use cft_ident_core::number::significant;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 
 use super::identify::IdentifiedDrives;
@@ -86,6 +87,16 @@ fn inverse(quantity: DriveQuantity) -> bool {
         DriveQuantity::Slowness | DriveQuantity::TorqueLimit
     )
 }
+
+/// A number as it is shown; a limit that there is not is none.
+pub(super) fn in_figures(quantity: DriveQuantity, value: f64) -> String {
+    match (inverse(quantity), value > 0.0) {
+        (true, true) => significant(value.recip(), 4),
+        (true, false) => "none".to_owned(),
+        (false, _) => significant(value, 4),
+    }
+}
+
 /// ln(before / after) as the part that goes.
 pub(super) fn part([gain, se]: [f64; 2]) -> GainSe {
     GainSe {

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::candidate::DriveEffect;
-use super::fit::{DriveProblem, NUMBERS as FIT, PieceSums, ResidualScales};
+use super::fit::{DriveProblem, FittedDrive, NUMBERS as FIT, PieceSums, ResidualScales};
 use super::judge::{self, BlockJackknife, JudgedDriveEffect, NUMBERS};
 use super::start;
 use super::unknown::{DriveQuantity, DriveUnknown};
@@ -122,6 +122,47 @@ const SHORT: usize = 5;
 /// same choices.
 const RIVALS: usize = 2;
 
+/// Parts of the largest torque that a joint is asked for at which its limit may lie.
+const LIMITED: [f64; 3] = [0.9, 0.6, 0.3];
+
+/// Fits from a start, and again with limits where they act: one that no torque reaches has no slope, and would stay out of
+/// reach of every better law that is found beside it.
+fn fit_limits(
+    problem: &DriveProblem,
+    unknowns: &[DriveUnknown],
+    start: &[f64],
+    scales: &ResidualScales,
+) -> FittedDrive {
+    let mut best = problem.fit(unknowns, start, scales, FIT.steps);
+    let limits =
+        (0..unknowns.len()).filter(|i| unknowns[*i].quantity == DriveQuantity::TorqueLimit);
+    let is_out_of_reach = |i: &usize| {
+        let mut none = best.values.clone();
+        none[*i] = 0.0;
+        problem.loss(unknowns, &none, scales) <= best.loss
+    };
+    let out: Vec<usize> = limits.filter(is_out_of_reach).collect();
+    if out.is_empty() {
+        return best;
+    }
+    let found = best.values.clone();
+    for part in LIMITED {
+        let mut acting = found.clone();
+        for i in &out {
+            let law = problem.frame.law(unknowns, &found);
+            let j = unknowns[*i].joint.unwrap_or(0);
+            let gains = problem.logs.iter().map(|log| log.joints[j].kp);
+            let gain = law.joints[j].stiffness * gains.fold(0.0, f64::max);
+            acting[*i] = 1.0 / (part * gain * problem.sizes[j].farthest);
+        }
+        let short = problem.fit(unknowns, &acting, scales, SHORT);
+        if short.loss < (1.0 - NUMBERS.noticeable) * best.loss {
+            best = problem.fit(unknowns, &short.values, scales, FIT.steps);
+        }
+    }
+    best
+}
+
 /// Fits with scales that follow the residual.
 pub fn fit(
     problem: &DriveProblem,
@@ -137,7 +178,7 @@ pub fn fit(
     let mut scales = first;
     let mut converged = false;
     for _ in 0..ROUNDS {
-        let fitted = problem.fit(unknowns, &values, &scales, FIT.steps);
+        let fitted = fit_limits(problem, unknowns, &values, &scales);
         values = fitted.values;
         converged = fitted.converged;
         scales = problem.scales(unknowns, &values);
@@ -209,8 +250,7 @@ struct RivalEffect {
 impl RivalEffect {
     /// Whether it does nearly as well as another one.
     fn is_near(&self, best: &RivalEffect) -> bool {
-        let [less, se] = judge::gain(&self.after, &best.after);
-        less < NUMBERS.screen * se
+        judge::is_near(judge::gain(&self.after, &best.after))
     }
 }
 
@@ -238,7 +278,7 @@ fn settle_rivals(
             let whole = Some(end.clone()).filter(other);
             std::iter::once(by_own).chain(whole)
         });
-        let fits = starts.map(|start| problem.fit(unknowns, &start, &at.scales, FIT.steps));
+        let fits = starts.map(|start| fit_limits(problem, unknowns, &start, &at.scales));
         if let Some(whole) = fits.min_by(|a, b| a.loss.total_cmp(&b.loss)) {
             rival.with = LawEstimate::at(problem, unknowns, whole.values, &at.scales);
             rival.after = rival.with.left_out();
@@ -255,7 +295,7 @@ fn settle_rivals(
     let scales = problem.scales(&first.with.unknowns, &first.with.values);
     for rival in [&mut *first, &mut *second] {
         let unknowns = &rival.with.unknowns;
-        let whole = problem.fit(unknowns, &rival.with.values, &scales, FIT.steps);
+        let whole = fit_limits(problem, unknowns, &rival.with.values, &scales);
         rival.with = LawEstimate::at(problem, unknowns, whole.values, &scales);
         rival.after = rival.with.left_out();
     }
@@ -364,6 +404,21 @@ pub fn without(problem: &DriveProblem, at: &LawEstimate, effect: DriveEffect) ->
     let kept = pairs.filter(|(unknown, _)| !gone.contains(unknown));
     let (unknowns, values): (Vec<DriveUnknown>, Vec<f64>) = kept.map(|(u, x)| (*u, *x)).unzip();
     fit(problem, &unknowns, &values, Some(&at.scales))
+}
+
+/// A solution with another effect in the place of one of its own, fitted to the end; none where it does worse on the blocks
+/// left out.
+pub fn near_exchange(
+    problem: &DriveProblem,
+    at: &LawEstimate,
+    own: DriveEffect,
+    other: DriveEffect,
+) -> Option<LawEstimate> {
+    let first = with(problem, &without(problem, at, own), other);
+    let whole = fit(problem, &first.unknowns, &first.values, Some(&at.scales));
+    let law = LawEstimate::at(problem, &whole.unknowns, whole.values, &at.scales);
+    let worse = judge::gain(&law.left_out(), &at.left_out());
+    judge::is_near(worse).then_some(law)
 }
 
 fn judged(

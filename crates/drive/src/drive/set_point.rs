@@ -1,7 +1,7 @@
 //! The set point that a firmware makes of its command, step by step.
 //!
-//! A step's set point is the mean over it, exact along each straight line of the late command: what an impulse over the
-//! step sees, wherever inside the step the command jumps or bends, so that it is smooth in the delay and in the speed limit.
+//! A step sees the set point part by straight part, wherever inside the step the command jumps or bends: what an impulse
+//! over the step is made of, smooth in the delay and in the speed limit.
 
 use super::track::CommandIs;
 
@@ -87,28 +87,28 @@ impl SetPointFollower {
         SetPointFollower { at, v_max }
     }
 
-    /// Mean of the set point from where the last step ended up to a time.
+    /// The set point from where the last step ended up to a time, part by part.
     #[inline]
-    pub fn mean_up_to(&mut self, command: &mut CommandLines, to: f64) -> f64 {
-        let from = command.last;
-        let mut integral = 0.0;
+    pub fn up_to(
+        &mut self,
+        command: &mut CommandLines,
+        to: f64,
+        visit: &mut impl FnMut(SetPointPart),
+    ) {
         while command.last < to {
-            integral += self.along(command.next(to));
-        }
-        match to > from {
-            true => integral / (to - from),
-            false => self.at,
+            self.along(command.next(to), visit);
         }
     }
 
-    /// Integral of the set point along a line of the command.
-    fn along(&mut self, line: StraightLine) -> f64 {
+    /// The set point along a line of the command.
+    #[inline]
+    fn along(&mut self, line: StraightLine, visit: &mut impl FnMut(SetPointPart)) {
         let StraightLine {
             mut from,
             slope,
             long,
         } = line;
-        let (mut left, mut integral) = (long, 0.0);
+        let mut left = long;
         if self.v_max.is_finite() && self.at != from {
             let behind = self.at - from;
             let closing = self.v_max + slope * behind.signum();
@@ -118,24 +118,50 @@ impl SetPointFollower {
                 true => behind.abs() / closing,
                 false => left,
             };
-            integral = (self.at + 0.5 * speed * run) * run;
-            self.at += speed * run;
+            visit(self.part(self.at, speed, run));
             left -= run;
             if left <= 0.0 {
-                return integral;
+                return;
             }
             from += slope * run;
         }
         // on its command: it stays there, or falls behind one that is too fast
-        let speed = slope.clamp(-self.v_max, self.v_max);
-        self.at = from + speed * left;
-        integral + (from + 0.5 * speed * left) * left
+        visit(self.part(from, slope.clamp(-self.v_max, self.v_max), left));
     }
+
+    fn part(&mut self, from: f64, speed: f64, long: f64) -> SetPointPart {
+        self.at = from + speed * long;
+        SetPointPart {
+            from,
+            to: self.at,
+            long,
+        }
+    }
+}
+
+/// A set point that moves from one position to another \[rad\] in a time \[s\].
+#[derive(Debug, Clone, Copy)]
+pub struct SetPointPart {
+    pub from: f64,
+    pub to: f64,
+    pub long: f64,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl SetPointFollower {
+        /// Mean of the set point from where the last step ended up to a time.
+        fn mean_up_to(&mut self, command: &mut CommandLines, to: f64) -> f64 {
+            let (mut integral, mut long) = (0.0, 0.0);
+            self.up_to(command, to, &mut |part| {
+                integral += 0.5 * (part.from + part.to) * part.long;
+                long += part.long;
+            });
+            integral / long
+        }
+    }
 
     /// Mean of the set point over a span, of a command that is followed at any speed.
     fn mean(t: &[f64], x: &[f64], kind: CommandIs, [from, to]: [f64; 2]) -> f64 {

@@ -14,16 +14,58 @@ use super::position;
 use super::words::ChannelRole;
 use crate::log::BridgedSample;
 
-/// Rows of one value from which a channel may be stuck.
-const STUCK_ROWS: u64 = 10;
-/// An edge is abrupt where its step is so many times the smallest usual one of the channel, too.
-const ABRUPT_STEPS: f64 = 4.0;
-/// Levels over its range from which a channel's grain is not worth a word.
-const FINE_LEVELS: f64 = 4096.0;
-/// Acceleration noise by the grain of a position, over the acceleration, that spoils a fit.
-const COARSE_ACCELERATION_SHARE: f64 = 0.1;
-/// Grain of a torque over its deviation that spoils a fit.
-const COARSE_TORQUE_SHARE: f64 = 0.1;
+/// The numbers that decide on the shape of a channel. Grains and usual lengths are of the channel itself, so that none
+/// depends on its unit.
+#[derive(Debug, Clone, Copy)]
+struct ShapeLimits {
+    /// Rows of one value from which a channel may be stuck: fewer are a torque in counts, or a reading that came late.
+    stuck_rows: u64,
+    /// Such a stretch lasts so many times longer than stretches of one value usually do (their 99th percentile): a coarse
+    /// or slowly read channel repeats itself too.
+    stuck_lengths: f64,
+    /// Rows from which the largest or smallest value of a channel may be a limit: a peak holds its value for less.
+    top_rows: u64,
+    /// The same for a driven joint as `stuck_lengths`, less of it: that the value is never exceeded is evidence of its own.
+    top_lengths: f64,
+    /// A flat stretch begins or ends abruptly where the channel steps by so many of its grains, too.
+    abrupt_steps: f64,
+    /// A joint has moved where it travelled so many grains of its position ..
+    moved_grains: f64,
+    /// .. and this share of its travel in the log.
+    moved_share: f64,
+    /// Grains of its whole travel from which a joint moves at all.
+    moving_grains: f64,
+    /// Rows about a fault that is reported already in which no other is looked for: those that filters and differences
+    /// smear it over.
+    reach_rows: f64,
+    /// Spikes so many rows apart are one episode.
+    spike_rows: f64,
+    /// Flat stretches apart by so many times their length are one episode: noise about a limit breaks a flat top into many.
+    apart_lengths: f64,
+    /// Levels over its range from which a channel's grain is not worth a word.
+    fine_levels: f64,
+    /// Acceleration noise by the grain of a position, over the acceleration, that spoils a fit.
+    coarse_acceleration_share: f64,
+    /// Grain of a torque over its deviation that spoils a fit.
+    coarse_torque_share: f64,
+}
+
+const LIMITS: ShapeLimits = ShapeLimits {
+    stuck_rows: 10,
+    stuck_lengths: 5.0,
+    top_rows: 5,
+    top_lengths: 3.0,
+    abrupt_steps: 4.0,
+    moved_grains: 10.0,
+    moved_share: 0.002,
+    moving_grains: 30.0,
+    reach_rows: 5.5,
+    spike_rows: 3.5,
+    apart_lengths: 3.0,
+    fine_levels: 4096.0,
+    coarse_acceleration_share: 0.1,
+    coarse_torque_share: 0.1,
+};
 
 pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
     let track = &judge.tracks[place];
@@ -50,7 +92,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     flat.off(place, draft);
     flat.report(draft);
     // Where a channel leaps out of a flat stretch it is reported already.
-    let reach = 5.5 * clock.dt;
+    let reach = LIMITS.reach_rows * clock.dt;
     let runs = flat.tops.iter().chain(&flat.stuck);
     let runs = runs.map(|run| [run.from, run.to]);
     let known = runs.chain(draft.stalls.iter().copied());
@@ -88,7 +130,7 @@ fn constant(judge: &LogJudge, track: &ChannelTrack, draft: &mut FaultList) {
     let joint_moves = track.position.is_some_and(|index| {
         let position = &judge.tracks[index];
         let step = position.flat.steps.quantile_not_zero(0.05);
-        position.travel() > 30.0 * step && position.travel() > 0.0
+        position.travel() > LIMITS.moving_grains * step && position.travel() > 0.0
     });
     let mut positions = judge.positions.iter();
     let all_rest = positions.all(|index| judge.tracks[*index].travel() == 0.0);
@@ -143,11 +185,11 @@ impl<'a> ChannelFlatness<'a> {
         let moved = track.position.map_or(f64::INFINITY, |index| {
             let position = &judge.tracks[index];
             let grain = position.flat.steps.quantile_not_zero(0.05);
-            (10.0 * grain).max(0.002 * position.travel())
+            (LIMITS.moved_grains * grain).max(LIMITS.moved_share * position.travel())
         });
         Self {
             track,
-            abrupt: (ABRUPT_BENDS * bends).max(ABRUPT_STEPS * grain),
+            abrupt: (ABRUPT_BENDS * bends).max(LIMITS.abrupt_steps * grain),
             slow: MIN_STEPS_IN_MOTION * grain,
             leaps: match track.channel.role {
                 ChannelRole::Position => position::places(track, clock),
@@ -184,9 +226,10 @@ impl<'a> ChannelFlatness<'a> {
             // velocities also rest where they are largest, but do not get there at once.
             let real = runs.iter().any(|run| {
                 let driven = !position && run.travel > self.moved;
-                self.is_abrupt(run) || (driven && run.rows as f64 >= 3.0 * self.usual)
+                self.is_abrupt(run)
+                    || (driven && run.rows as f64 >= LIMITS.top_lengths * self.usual)
             });
-            if longest >= 5 && real {
+            if longest >= LIMITS.top_rows && real {
                 self.tops.extend(runs);
             }
         }
@@ -196,13 +239,14 @@ impl<'a> ChannelFlatness<'a> {
     fn stuck(&mut self) {
         let position = self.track.channel.role == ChannelRole::Position;
         for run in &self.track.flat.runs {
-            let long = run.rows >= STUCK_ROWS
-                && run.rows as f64 >= 5.0 * self.usual.min(STUCK_ROWS as f64);
+            let rows = run.rows as f64;
+            let least = LIMITS.stuck_lengths * self.usual.min(LIMITS.stuck_rows as f64);
+            let long = run.rows >= LIMITS.stuck_rows && rows >= least;
             if !long || self.tops.iter().any(|top| top.is(run)) {
                 continue;
             }
             let meanwhile =
-                !position && run.travel > self.moved && run.rows as f64 >= 5.0 * self.usual;
+                !position && run.travel > self.moved && rows >= LIMITS.stuck_lengths * self.usual;
             if meanwhile || (self.is_abrupt(run) && (position || run.travel > self.moved)) {
                 self.stuck.push(*run);
             }
@@ -216,7 +260,7 @@ impl<'a> ChannelFlatness<'a> {
         }
         let mut episodes = FaultEpisodes::default();
         let mut runs: Vec<FlatRun> = self.tops.iter().chain(&self.stuck).copied().collect();
-        runs.retain(|run| run.value == 0.0 && run.rows >= STUCK_ROWS);
+        runs.retain(|run| run.value == 0.0 && run.rows >= LIMITS.stuck_rows);
         runs.sort_by(|a, b| a.from.total_cmp(&b.from));
         runs.dedup_by(|a, b| a.is(b));
         for run in &runs {
@@ -240,7 +284,12 @@ impl<'a> ChannelFlatness<'a> {
             let mut episodes = FaultEpisodes::default();
             for run in runs {
                 // Noise about the limit breaks a flat top into many.
-                episodes.add(run.from, run.to, run.rows, 3.0 * (run.to - run.from));
+                episodes.add(
+                    run.from,
+                    run.to,
+                    run.rows,
+                    LIMITS.apart_lengths * (run.to - run.from),
+                );
             }
             episodes
         };
@@ -275,7 +324,11 @@ impl<'a> ChannelFlatness<'a> {
             true => "these rows are left out of a fit",
             false => "a fit does not read this channel",
         };
-        let effect = format!("of one value while the joint moves: {then}");
+        let longest = self.stuck.iter().map(|run| run.rows).max().unwrap_or(0);
+        let effect = format!(
+            "of one value for up to {longest} rows while the joint moves, usually for {}: {then}",
+            self.usual.ceil()
+        );
         let remedy =
             "check cable, sensor and recorder of this channel; record again if much is lost";
         let stuck = gathered(&self.stuck);
@@ -309,14 +362,16 @@ fn spikes(
         ChannelRole::Position => 0.5 * position::drive(track, clock),
         _ => SPIKE_SHARE * track.deviation(),
     };
-    let least = (SPIKE * usual).max(ABRUPT_STEPS * grain).max(of_motion);
+    let least = (SPIKE * usual)
+        .max(LIMITS.abrupt_steps * grain)
+        .max(of_motion);
     let shown = |t: f64| shown.iter().any(|[from, to]| *from <= t && t <= *to);
     let mut high: Vec<_> = track.spikes.found.iter().collect();
     high.retain(|spike| spike.height.abs() > least && !shown(spike.t));
     let mut episodes = FaultEpisodes::default();
     let mut highest = 0.0f64;
     for spike in &high {
-        episodes.add(spike.t, spike.t, 1, 3.5 * clock.dt);
+        episodes.add(spike.t, spike.t, 1, LIMITS.spike_rows * clock.dt);
         highest = highest.max(spike.height.abs());
     }
     if high.is_empty() {
@@ -356,7 +411,7 @@ fn coarse(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultL
     };
     let levels = track.travel() / step;
     // A stationary joint shows a few counts, which is no fault.
-    if levels < 30.0 && track.channel.role != ChannelRole::Torque {
+    if levels < LIMITS.moving_grains && track.channel.role != ChannelRole::Torque {
         return;
     }
     if track.channel.role == ChannelRole::Position && !judge.moves(track) {
@@ -371,14 +426,14 @@ fn coarse(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultL
             let w = std::f64::consts::TAU * band;
             let noise = step * (clock.dt * band / 30.0).sqrt() * w * w;
             let share = noise / excitation.rms(0);
-            (share > COARSE_ACCELERATION_SHARE).then(|| {
+            (share > LIMITS.coarse_acceleration_share).then(|| {
                 format!(
                     "steps of {step:.3e}: below {band} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",
                     100.0 * share
                 )
             })
         }
-        (ChannelRole::Torque, _) if step > COARSE_TORQUE_SHARE * track.deviation() => {
+        (ChannelRole::Torque, _) if step > LIMITS.coarse_torque_share * track.deviation() => {
             Some(format!(
                 "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters cannot be identified from it",
                 100.0 * step / track.deviation()
@@ -388,7 +443,7 @@ fn coarse(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultL
     };
     let (severity, effect) = match spoils {
         Some(effect) => (Warning, effect),
-        None if levels >= FINE_LEVELS => return,
+        None if levels >= LIMITS.fine_levels => return,
         None => (
             Info,
             format!(
