@@ -112,8 +112,8 @@ impl DriveEffect {
             DriveEffect::TorqueLimit => all(&[0.9, 0.6, 0.3], &|s, part| {
                 1.0 / (part * s.torque * s.farthest / s.error)
             }),
-            DriveEffect::LoadFriction => all(&[0.05], &|_, part| part),
-            DriveEffect::Stribeck => all(&[0.1], &|s, part| part * s.torque),
+            DriveEffect::LoadFriction => all(&[0.05, 0.4], &|_, part| part),
+            DriveEffect::Stribeck => all(&[0.1, 0.8], &|s, part| part * s.torque),
             DriveEffect::EncoderBias | DriveEffect::TorqueOffset => all(&[0.0], &|_, _| 0.0),
         }
     }

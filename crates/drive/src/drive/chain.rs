@@ -2,14 +2,15 @@
 //!
 //! (M(q) + Ja) a + C v + g = tau_m + c - D v - dry friction. As on one axis a step drifts half, kicks and drifts half;
 //! impulses of dry friction settle joint after joint. M is that of the measured positions, computed once a log: what
-//! drives are off by moves it by parts in a hundred of the links' share; gravity and C v follow the predicted motion.
+//! drives are off by moves it by parts in a hundred of the links' share; gravity and C v follow the predicted motion, from
+//! one sample to the next along a straight line: held they would be late, which looks like damping.
 
 use std::collections::HashMap;
 
 use cft_ident_core::robot::Robot;
 
-use super::law::{DriveLawKind, MachineLaw};
-use super::roll_out::{PastStates, RolledDrive, first_speeds, steps};
+use super::law::MachineLaw;
+use super::roll_out::{PastStates, RollOutFrame, RolledDrive, first_speeds, steps};
 use super::set_point::{CommandLines, SetPointFollower};
 use super::track::DriveLog;
 
@@ -89,16 +90,16 @@ impl RobotChains {
     }
 
     /// Positions of all joints along a log, as the encoders would read them.
-    pub fn roll(&self, log: &DriveLog, kind: DriveLawKind, law: &MachineLaw) -> Vec<Vec<f64>> {
-        let roll = |speeds: &[f64], count: usize| self.roll_from(log, (kind, law), speeds, count);
-        self.roll_from(log, (kind, law), &first_speeds(log, &roll), log.t.len())
+    pub fn roll(&self, log: &DriveLog, frame: RollOutFrame, law: &MachineLaw) -> Vec<Vec<f64>> {
+        let roll = |speeds: &[f64], count: usize| self.roll_from(log, (frame, law), speeds, count);
+        self.roll_from(log, (frame, law), &first_speeds(log, roll), log.t.len())
     }
 
     /// The first so many positions from speeds at the first sample \[rad/s\].
     fn roll_from(
         &self,
         log: &DriveLog,
-        (kind, law): (DriveLawKind, &MachineLaw),
+        ((kind, longest), law): (RollOutFrame, &MachineLaw),
         speeds: &[f64],
         count: usize,
     ) -> Vec<Vec<f64>> {
@@ -123,11 +124,11 @@ impl RobotChains {
             });
         }
         let still = vec![0.0; n];
-        let mut bias = vec![0.0; n];
+        let (mut bias, mut before, mut rate) = (vec![0.0; n], Vec::new(), vec![0.0; n]);
         let mut work = KickWork::new(n);
         for k in 1..t.len() {
             let dt = t[k] - t[k - 1];
-            let parts = steps(dt);
+            let parts = steps(dt, longest);
             let h = dt / parts as f64;
             let mass = &inertia[(k - 1) * n * n..k * n * n];
             for i in 0..parts {
@@ -137,6 +138,10 @@ impl RobotChains {
                 }
                 if i == 0 {
                     self.robot.torque(&self.theta, &q, &v, &still, &mut bias);
+                    for (j, before) in before.iter().enumerate() {
+                        rate[j] = (bias[j] - before) / dt;
+                    }
+                    before.clone_from(&bias);
                 }
                 for (j, (track, of)) in joints.clone().enumerate() {
                     let side = &mut sides[j];
@@ -154,7 +159,8 @@ impl RobotChains {
                         (tau, slope) = (0.0, 0.0);
                     }
                     let damping = if on { of.damping } else { of.viscous };
-                    work.force[j] = tau + of.offset - bias[j] - damping * v[j];
+                    let links = bias[j] + rate[j] * i as f64 * h;
+                    work.force[j] = tau + of.offset - links - damping * v[j];
                     work.added[j] = of.armature + 0.5 * h * (damping + slope * seen.own);
                     work.limit[j] = h * of.dry(v[j], tau);
                 }

@@ -102,6 +102,17 @@ fn robust(u: f64) -> (f64, f64) {
 }
 
 impl DriveProblem<'_> {
+    /// The same by roll-outs of other steps [s].
+    pub fn by_steps(&self, longest_step: f64) -> Self {
+        DriveProblem {
+            frame: UnknownFrame {
+                longest_step,
+                ..self.frame.clone()
+            },
+            ..self.clone()
+        }
+    }
+
     /// Predicted positions of a log, joint after joint.
     pub fn positions(
         &self,
@@ -110,14 +121,15 @@ impl DriveProblem<'_> {
         values: &[f64],
     ) -> Vec<Vec<f64>> {
         let law = self.frame.law(unknowns, values);
+        let frame = (self.frame.kind, self.frame.longest_step);
         if let (DriveLoad::Robot, Some(chains)) = (log.load, self.chains) {
-            return chains.roll(log, self.frame.kind, &law);
+            return chains.roll(log, frame, &law);
         }
         let joints = 0..log.joints.len();
         joints
             .map(|j| {
                 let mut out = vec![0.0; log.t.len()];
-                roll_axis(log, self.frame.kind, &law, j, &mut out);
+                roll_axis(log, frame, &law, j, &mut out);
                 out
             })
             .collect()

@@ -7,10 +7,12 @@ use cft_ident_core::robot::Robot;
 use super::candidate::DriveEffect;
 use super::chain::RobotChains;
 use super::error::DriveError;
+use super::estimate::{self, LawEstimate};
 use super::fit::{DriveProblem, LogPiece};
 use super::judge::NUMBERS;
 use super::law::DriveLawKind;
-use super::search::{self, FoundDrive, LawEstimate, StepCertainty};
+use super::roll_out::{COARSE_STEP, FINE_STEP};
+use super::search::{self, FoundDrive, StepCertainty};
 use super::start;
 use super::track::median;
 use super::track::{DriveLoad, DriveLog};
@@ -100,6 +102,8 @@ pub struct IdentifiedDrives {
 pub struct OtherLaw {
     pub effect: DriveEffect,
     pub law: LawEstimate,
+    /// The law that is written, by the same steps.
+    pub written: LawEstimate,
 }
 
 /// Positions along a log, joint after joint [rad].
@@ -146,6 +150,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
             },
             joints: first.joints.len(),
             stribeck_speed: sizes.iter().map(|s| STRIBECK_SPEED * s.speed).collect(),
+            longest_step: COARSE_STEP,
             held: Vec::new(),
         },
         sizes,
@@ -162,9 +167,10 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
     };
     doing("gain, damping, friction");
     let unknowns = start::declared(&fitted, kind);
-    let given = search::declared(&problem, &unknowns);
+    let given = estimate::declared(&problem, &unknowns);
     let possible = DriveEffect::possible(kind, gravity, first.load != DriveLoad::Unknown);
     let mut found = search::search(&problem, given, &possible, doing);
+    problem = problem.by_steps(FINE_STEP);
     let held_out: Vec<&DriveLog> = data.held_out.iter().collect();
     confirm_held_out(&problem, &mut found, &held_out);
     shrink(&mut problem, &mut found);
@@ -370,7 +376,7 @@ fn unseen(
             logs: &rest,
             pieces,
             blocks,
-            ..problem.clone()
+            ..problem.by_steps(COARSE_STEP)
         };
         let fitted = match kept.len() == problem.logs.len() {
             true => at.clone(),
@@ -405,7 +411,7 @@ fn confirm_held_out(problem: &DriveProblem, found: &mut FoundDrive, held_out: &[
         if !found.steps[at].written() {
             continue;
         }
-        let less = search::without(problem, &found.refined, found.steps[at].effect);
+        let less = estimate::without(problem, &found.refined, found.steps[at].effect);
         let with = errors_on(problem, &found.refined, held_out).mae(None);
         if with > errors_on(problem, &less, held_out).mae(None) {
             found.steps[at].status = StepCertainty::HeldOutWorse;
@@ -428,7 +434,7 @@ fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
         .collect();
     for (effect, held) in smaller {
         problem.frame.held.extend(held);
-        found.refined = search::without(problem, &found.refined, effect);
+        found.refined = estimate::without(problem, &found.refined, effect);
     }
 }
 
@@ -437,18 +443,27 @@ fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
 fn other_laws(problem: &DriveProblem, found: &mut FoundDrive) -> Vec<OtherLaw> {
     let written: Vec<_> = found.steps.iter().filter(|step| step.written()).collect();
     let written: Vec<DriveEffect> = written.iter().map(|step| step.effect).collect();
-    let (refined, mut laws) = (&found.refined, Vec::new());
+    let coarse = problem.by_steps(COARSE_STEP);
+    let refined = &found.refined;
+    let refined = estimate::fit(
+        &coarse,
+        &refined.unknowns,
+        &refined.values,
+        Some(&refined.scales),
+    );
+    let mut laws = Vec::new();
     for step in &mut found.steps {
         let own = step.effect;
         step.alternatives.retain(|other| {
             if !written.contains(&own) || written.contains(other) {
                 return false;
             }
-            let near = search::near_exchange(problem, refined, own, *other);
+            let near = search::near_exchange(&coarse, &refined, own, *other);
             let is_near = near.is_some();
             laws.extend(near.map(|law| OtherLaw {
                 effect: *other,
                 law,
+                written: refined.clone(),
             }));
             is_near
         });

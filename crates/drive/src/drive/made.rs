@@ -34,7 +34,7 @@ impl DriveResult {
         let reach = at.jackknife.reach();
         for (i, (unknown, value)) in at.unknowns.iter().zip(&at.values).enumerate() {
             let own = at.jackknife.std(i);
-            let other = of.furthest_other(*unknown, *value);
+            let other = of.furthest_other(*unknown);
             // what another law says is as likely
             let std = own.map(|own| own.hypot(other.map_or(0.0, |other| other.shift)));
             let parameter = parameter(of, volts, *unknown, *value, std, reach);
@@ -128,14 +128,15 @@ impl FurthestOther {
 
 impl IdentifiedDrives {
     /// Of a number of the law that is written; none where there is no other law.
-    fn furthest_other(&self, unknown: DriveUnknown, value: f64) -> Option<FurthestOther> {
+    fn furthest_other(&self, unknown: DriveUnknown) -> Option<FurthestOther> {
         let of = |other: &OtherLaw| {
             // a law without the number has none of it
-            let other_value = other.law.value(unknown).unwrap_or(0.0);
+            let [value, written] =
+                [&other.law, &other.written].map(|law| law.value(unknown).unwrap_or(0.0));
             FurthestOther {
                 effect: other.effect,
-                value: other_value,
-                shift: (other_value - value).abs(),
+                value,
+                shift: (value - written).abs(),
             }
         };
         let all = self.others.iter().map(of);

@@ -5,6 +5,7 @@
 //!       -> checked                      check     units, rest, stops
 //!       -> roll-outs                    roll_out  one axis; chain: arms and legs
 //!       -> fitted law                   fit       output error, Gauss-Newton with bounds
+//!       -> LawEstimate                  estimate  with deviations, with one effect more or less
 //!       -> steps, judged                search    candidate effects, jackknife in judge
 //!       -> Drives                       outcome   names, units, verdicts; drive_file: TOML
 //! ```
@@ -14,6 +15,7 @@ pub mod chain;
 pub mod check;
 pub mod drive_file;
 pub mod error;
+pub mod estimate;
 pub mod export;
 pub mod fit;
 pub mod identify;

@@ -10,21 +10,24 @@ use super::law::{DriveLawKind, JointLaw, MachineLaw};
 use super::set_point::{CommandLines, SetPointFollower};
 use super::track::{DriveLoad, DriveLog};
 
-/// Longest step [s]. Half: by the numbers of a simulated servo, whose encoder alone makes 0.38 mrad, positions are missed by
-/// 0.41 mrad in place of 0.44; twice: by 0.56 mrad.
-pub const LONGEST_STEP: f64 = 2.5e-3;
+/// Longest step of the roll-outs that choose effects [s]. Half: by the numbers of a simulated servo, whose encoder alone
+/// makes 0.38 mrad, positions are missed by 0.41 mrad in place of 0.44; twice: by 0.56 mrad.
+pub const COARSE_STEP: f64 = 2.5e-3;
+
+/// Longest step of those that estimate and judge [s].
+pub const FINE_STEP: f64 = 0.625e-3;
 
 /// Whatever moves further than this from where it was measured is lost [rad]; it is set there.
 const LOST: f64 = 1e3;
 
 /// Steps of one sample interval.
-pub fn steps(dt: f64) -> usize {
-    (dt / LONGEST_STEP - 1e-6).ceil().max(1.0) as usize
+pub fn steps(dt: f64, longest: f64) -> usize {
+    (dt / longest - 1e-6).ceil().max(1.0) as usize
 }
 
-/// Span whose positions say with which speed a log begins [s]. Half, twice: the numbers of a simulated servo move by less
-/// than 0.03 %, a tenth of their error.
-const BEGIN: f64 = 0.25;
+/// Span whose positions say with which speed a log begins [s]. 0.125, 0.25 and 0.5: the numbers of a simulated
+/// servo are the same within 0.03 %, a tenth of their error.
+const BEGIN: f64 = 0.15;
 
 /// Gauss-Newton steps to that speed. Half: a servo whose log begins in a jump has an armature 0.2 % off; twice: the same.
 const BEGIN_STEPS: usize = 2;
@@ -34,14 +37,14 @@ const SPEED_STEP: f64 = 1e-3;
 
 /// Speeds with which the joints of a log begin [rad/s]: those whose motion lies nearest to the first positions. A slope of
 /// the first samples would be that of what the drive does meanwhile. `roll` gives the first so many positions from speeds.
-pub fn first_speeds(log: &DriveLog, roll: &dyn Fn(&[f64], usize) -> Vec<Vec<f64>>) -> Vec<f64> {
+pub fn first_speeds(log: &DriveLog, roll: impl Fn(&[f64], usize) -> Vec<Vec<f64>>) -> Vec<f64> {
     let end = log.t[0] + BEGIN;
     let count = log.t.partition_point(|t| *t <= end);
     let n = log.joints.len();
     let mut speeds = vec![0.0; n];
-    let Some(last) = (count > FEW).then(|| count - 1) else {
+    if count <= FEW {
         return speeds;
-    };
+    }
     let slope = |q: &[f64]| (q[FEW] - q[0]) / (log.t[FEW] - log.t[0]);
     for (speed, track) in speeds.iter_mut().zip(&log.joints) {
         *speed = slope(&track.position);
@@ -52,13 +55,13 @@ pub fn first_speeds(log: &DriveLog, roll: &dyn Fn(&[f64], usize) -> Vec<Vec<f64>
         off.flatten().collect()
     };
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-    let mut here = roll(&speeds, last + 1);
+    let mut here = roll(&speeds, count);
     let mut error = off(&here);
     for _ in 0..BEGIN_STEPS {
         let column = |j: usize| -> Vec<f64> {
             let mut moved = speeds.clone();
             moved[j] += SPEED_STEP;
-            let there = roll(&moved, last + 1);
+            let there = roll(&moved, count);
             let pairs = there.iter().flatten().zip(here.iter().flatten());
             pairs.map(|(x, base)| (x - base) / SPEED_STEP).collect()
         };
@@ -78,12 +81,12 @@ pub fn first_speeds(log: &DriveLog, roll: &dyn Fn(&[f64], usize) -> Vec<Vec<f64>
             .zip(change.iter())
             .map(|(v, c)| v - c)
             .collect();
-        let there = roll(&next, last + 1);
+        let there = roll(&next, count);
         let after = off(&there);
-        if !(square(&after) < square(&error)) {
-            break;
+        match square(&after) < square(&error) {
+            true => (speeds, here, error) = (next, there, after),
+            false => break,
         }
-        (speeds, here, error) = (next, there, after);
     }
     speeds
 }
@@ -162,10 +165,13 @@ fn limited_mean([from, to]: [f64; 2], most: f64) -> (f64, f64) {
     (0.5 * (low + high) * share + beyond / (to - from), share)
 }
 
+/// How a drive makes torque, and the longest step of a roll-out [s].
+pub type RollOutFrame = (DriveLawKind, f64);
+
 /// Positions of one axis along a log, as its encoder would read them.
 pub fn roll_axis(
     log: &DriveLog,
-    kind: DriveLawKind,
+    frame: RollOutFrame,
     law: &MachineLaw,
     joint: usize,
     out: &mut [f64],
@@ -176,17 +182,17 @@ pub fn roll_axis(
     };
     let roll = |speeds: &[f64], count: usize| {
         let mut out = vec![0.0; count];
-        roll_from(log, (kind, law), joint, speeds[0], &mut out);
+        roll_from(log, (frame, law), joint, speeds[0], &mut out);
         vec![out]
     };
-    let speed = first_speeds(&only, &roll)[0];
-    roll_from(log, (kind, law), joint, speed, out);
+    let speed = first_speeds(&only, roll)[0];
+    roll_from(log, (frame, law), joint, speed, out);
 }
 
 /// The first positions of one axis from a speed at the first sample \[rad/s\].
 fn roll_from(
     log: &DriveLog,
-    (kind, law): (DriveLawKind, &MachineLaw),
+    ((kind, longest), law): (RollOutFrame, &MachineLaw),
     joint: usize,
     speed: f64,
     out: &mut [f64],
@@ -206,7 +212,7 @@ fn roll_from(
     out[0] = q - of.bias;
     for k in 1..t.len() {
         let dt = t[k] - t[k - 1];
-        let count = steps(dt);
+        let count = steps(dt, longest);
         let h = dt / count as f64;
         let supply = match (law.supply, track.supply.get(k - 1)) {
             (Some(reference), Some(volts)) => volts / reference,

@@ -9,55 +9,11 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::candidate::DriveEffect;
-use super::fit::{DriveProblem, FittedDrive, NUMBERS as FIT, PieceSums, ResidualScales};
-use super::judge::{self, BlockJackknife, JudgedDriveEffect, NUMBERS};
-use super::start;
-use super::unknown::{DriveQuantity, DriveUnknown};
-
-/// A fitted law with its deviations.
-#[derive(Debug, Clone)]
-pub struct LawEstimate {
-    pub unknowns: Vec<DriveUnknown>,
-    pub values: Vec<f64>,
-    pub converged: bool,
-    pub scales: ResidualScales,
-    pub blocks: Vec<PieceSums>,
-    pub jackknife: BlockJackknife,
-}
-
-impl LawEstimate {
-    /// Of values that a fit ended at.
-    fn at(
-        problem: &DriveProblem,
-        unknowns: &[DriveUnknown],
-        values: Vec<f64>,
-        scales: &ResidualScales,
-    ) -> Self {
-        let blocks = problem.by_block(&problem.linearised(unknowns, &values, scales));
-        LawEstimate {
-            jackknife: BlockJackknife::new(unknowns, &values, &blocks),
-            unknowns: unknowns.to_vec(),
-            values,
-            converged: true,
-            scales: scales.clone(),
-            blocks,
-        }
-    }
-
-    fn loss(&self) -> f64 {
-        self.blocks.iter().map(|block| block.loss).sum()
-    }
-
-    /// Losses of the blocks, each by the others.
-    pub fn left_out(&self) -> Vec<f64> {
-        self.jackknife.left_out(&self.blocks)
-    }
-
-    pub fn value(&self, unknown: DriveUnknown) -> Option<f64> {
-        let at = self.unknowns.iter().position(|u| *u == unknown)?;
-        Some(self.values[at])
-    }
-}
+use super::estimate::{LawEstimate, fit, fit_limits, with, without};
+use super::fit::DriveProblem;
+use super::judge::{self, JudgedDriveEffect, NUMBERS};
+use super::roll_out::FINE_STEP;
+use super::unknown::DriveUnknown;
 
 /// How sure a step is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,128 +71,9 @@ pub struct FoundDrive {
     pub tried: Vec<TriedStep>,
 }
 
-/// Steps of a fit of a candidate from the best of its starts on.
-const SHORT: usize = 5;
-
 /// Candidates that are fitted to the end before one of them is chosen. One: the order of short fits decides; more: the
 /// same choices.
 const RIVALS: usize = 2;
-
-/// Parts of the largest torque that a joint is asked for at which its limit may lie.
-const LIMITED: [f64; 3] = [0.9, 0.6, 0.3];
-
-/// Fits from a start, and again with limits where they act: one that no torque reaches has no slope, and would stay out of
-/// reach of every better law that is found beside it.
-fn fit_limits(
-    problem: &DriveProblem,
-    unknowns: &[DriveUnknown],
-    start: &[f64],
-    scales: &ResidualScales,
-) -> FittedDrive {
-    let mut best = problem.fit(unknowns, start, scales, FIT.steps);
-    let limits =
-        (0..unknowns.len()).filter(|i| unknowns[*i].quantity == DriveQuantity::TorqueLimit);
-    let is_out_of_reach = |i: &usize| {
-        let mut none = best.values.clone();
-        none[*i] = 0.0;
-        problem.loss(unknowns, &none, scales) <= best.loss
-    };
-    let out: Vec<usize> = limits.filter(is_out_of_reach).collect();
-    if out.is_empty() {
-        return best;
-    }
-    let found = best.values.clone();
-    for part in LIMITED {
-        let mut acting = found.clone();
-        for i in &out {
-            let law = problem.frame.law(unknowns, &found);
-            let j = unknowns[*i].joint.unwrap_or(0);
-            let gains = problem.logs.iter().map(|log| log.joints[j].kp);
-            let gain = law.joints[j].stiffness * gains.fold(0.0, f64::max);
-            acting[*i] = 1.0 / (part * gain * problem.sizes[j].farthest);
-        }
-        let short = problem.fit(unknowns, &acting, scales, SHORT);
-        if short.loss < (1.0 - NUMBERS.noticeable) * best.loss {
-            best = problem.fit(unknowns, &short.values, scales, FIT.steps);
-        }
-    }
-    best
-}
-
-/// Fits with scales that follow the residual.
-pub fn fit(
-    problem: &DriveProblem,
-    unknowns: &[DriveUnknown],
-    start: &[f64],
-    scales: Option<&ResidualScales>,
-) -> LawEstimate {
-    let mut values = start.to_vec();
-    let first = match scales {
-        Some(scales) => scales.clone(),
-        None => problem.scales(unknowns, &values),
-    };
-    let mut scales = first;
-    let mut converged = false;
-    for _ in 0..ROUNDS {
-        let fitted = fit_limits(problem, unknowns, &values, &scales);
-        values = fitted.values;
-        converged = fitted.converged;
-        scales = problem.scales(unknowns, &values);
-    }
-    let mut solution = LawEstimate::at(problem, unknowns, values, &scales);
-    // a limit that is never reached is none
-    for (i, unknown) in unknowns.iter().enumerate() {
-        let seen = solution.blocks.iter().any(|block| block.h[(i, i)] > 0.0);
-        if unknown.quantity == DriveQuantity::TorqueLimit && !seen {
-            solution.values[i] = 0.0;
-        }
-    }
-    solution.converged = converged;
-    solution
-}
-
-/// Fits in a row whose scales follow the residual. One: scales of the start; more: the same to two digits.
-const ROUNDS: usize = 3;
-
-/// The declared drive, from several starts.
-pub fn declared(problem: &DriveProblem, unknowns: &[DriveUnknown]) -> LawEstimate {
-    let mut best: Option<(f64, LawEstimate)> = None;
-    for start in start::starts(problem, unknowns) {
-        let scales = problem.scales(unknowns, &start);
-        let first = problem.fit(unknowns, &start, &scales, FIT.steps);
-        let loss = problem
-            .losses_by_joint(unknowns, &first.values)
-            .iter()
-            .sum();
-        if best.as_ref().is_none_or(|(known, _)| loss < *known) {
-            best = Some((loss, fit(problem, unknowns, &first.values, None)));
-        }
-    }
-    best.expect("there are starts").1
-}
-
-/// The best of the starts of an effect, fitted beside a solution with its scales.
-pub fn with(problem: &DriveProblem, beside: &LawEstimate, effect: DriveEffect) -> LawEstimate {
-    let mut unknowns = beside.unknowns.clone();
-    unknowns.extend(effect.unknowns(problem.frame.joints));
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for start in effect.starts(&problem.sizes) {
-        let mut values = beside.values.clone();
-        values.extend(start);
-        let fitted = problem.fit(&unknowns, &values, &beside.scales, 1);
-        if best.as_ref().is_none_or(|(loss, _)| fitted.loss < *loss) {
-            best = Some((fitted.loss, fitted.values));
-        }
-    }
-    let (loss, mut values) = best.expect("there are starts");
-    // what gains nothing where it is fitted gains nothing elsewhere
-    if loss < (1.0 - NUMBERS.noticeable) * beside.loss() {
-        values = problem
-            .fit(&unknowns, &values, &beside.scales, SHORT)
-            .values;
-    }
-    LawEstimate::at(problem, &unknowns, values, &beside.scales)
-}
 
 /// An effect that helps the blocks left out, beside others that do.
 struct RivalEffect {
@@ -304,61 +141,132 @@ fn settle_rivals(
     }
 }
 
-/// The search, from the declared drive on.
+/// An effect that joined, with its gain then and what stood beside it.
+type JoinedEffect = (DriveEffect, [f64; 2], Vec<DriveEffect>);
+
+/// A model on its way: what it is fitted as, what joined, and what was tried last and not taken.
+struct GrowingLaw {
+    at: LawEstimate,
+    joined: Vec<JoinedEffect>,
+    tried: Vec<TriedStep>,
+}
+
+/// The search, from the declared drive on: steps of at most `longest_step` choose effects, finer ones estimate and judge.
 pub fn search(
     problem: &DriveProblem,
     given: LawEstimate,
     possible: &[DriveEffect],
     doing: &dyn Fn(&str),
 ) -> FoundDrive {
-    let mut at = given.clone();
-    let mut joined: Vec<(DriveEffect, [f64; 2], Vec<DriveEffect>)> = Vec::new();
-    let mut tried = Vec::new();
-    while joined.len() < NUMBERS.steps && problem.blocks > 1 {
-        let before = at.left_out();
-        tried.clear();
-        let mut fitted = Vec::new();
-        for effect in possible
-            .iter()
-            .filter(|e| !joined.iter().any(|(known, ..)| known == *e))
-        {
-            doing(effect.name());
-            let with = with(problem, &at, *effect);
-            let after = with.left_out();
-            let [gain, se] = judge::gain(&before, &after);
-            tried.push(TriedStep {
+    let begin = GrowingLaw {
+        at: given,
+        joined: Vec::new(),
+        tried: Vec::new(),
+    };
+    let (firsts, tried) = rivals(problem, &begin, possible, doing);
+    // one effect may stand for two others, which show where it does not come first
+    let grown = (0..firsts.len().min(RIVALS)).map(|k| {
+        let mut law = begin.joined_by(problem, &firsts, k);
+        law.tried.clone_from(&tried);
+        grow(problem, law, possible, doing)
+    });
+    let best = grown.reduce(|best, other| {
+        let scales = &best.at.scales;
+        let same = LawEstimate::at(problem, &other.at.unknowns, other.at.values.clone(), scales);
+        match judge::gain(&best.at.left_out(), &same.left_out())[0] > 0.0 {
+            true => other,
+            false => best,
+        }
+    });
+    let best = best.unwrap_or(GrowingLaw {
+        tried,
+        at: begin.at.clone(),
+        joined: Vec::new(),
+    });
+    let fine = problem.by_steps(FINE_STEP);
+    let refit = |law: &LawEstimate| fit(&fine, &law.unknowns, &law.values, Some(&law.scales));
+    let given = refit(&begin.at);
+    let mut found = settle(&fine, given, refit(&best.at), best.joined);
+    found.tried = best.tried;
+    found
+}
+
+/// Lets effects join a model one by one, the best first, as long as one helps.
+fn grow(
+    problem: &DriveProblem,
+    mut law: GrowingLaw,
+    possible: &[DriveEffect],
+    doing: &dyn Fn(&str),
+) -> GrowingLaw {
+    while law.joined.len() < NUMBERS.steps {
+        let (sorted, tried) = rivals(problem, &law, possible, doing);
+        law.tried = tried;
+        if sorted.is_empty() {
+            break;
+        }
+        law = law.joined_by(problem, &sorted, 0);
+    }
+    law
+}
+
+impl GrowingLaw {
+    /// The same with the effect at a place of the list of rivals.
+    fn joined_by(&self, problem: &DriveProblem, sorted: &[RivalEffect], place: usize) -> Self {
+        let own = &sorted[place];
+        let others = sorted.iter().filter(|other| other.effect != own.effect);
+        let near = others.filter(|other| other.is_near(own));
+        let alternatives = near.map(|other| other.effect).collect();
+        let mut joined = self.joined.clone();
+        joined.push((own.effect, own.gain, alternatives));
+        GrowingLaw {
+            at: fit(
+                problem,
+                &own.with.unknowns,
+                &own.with.values,
+                Some(&self.at.scales),
+            ),
+            joined,
+            tried: self.tried.clone(),
+        }
+    }
+}
+
+/// Effects that help the blocks left out beside a model, the best first, and all that were tried.
+fn rivals(
+    problem: &DriveProblem,
+    law: &GrowingLaw,
+    possible: &[DriveEffect],
+    doing: &dyn Fn(&str),
+) -> (Vec<RivalEffect>, Vec<TriedStep>) {
+    let (mut fitted, mut tried) = (Vec::new(), Vec::new());
+    if problem.blocks <= 1 {
+        return (fitted, tried);
+    }
+    let before = law.at.left_out();
+    let is_new = |effect: &&DriveEffect| law.joined.iter().all(|(known, ..)| known != *effect);
+    for effect in possible.iter().filter(is_new) {
+        doing(effect.name());
+        let with = with(problem, &law.at, *effect);
+        let after = with.left_out();
+        let [gain, se] = judge::gain(&before, &after);
+        tried.push(TriedStep {
+            effect: *effect,
+            gain: [gain, se],
+        });
+        // a part of the error is half of that of its square
+        let noticeable = gain > 2.0 * NUMBERS.noticeable;
+        if noticeable && gain > NUMBERS.screen * se {
+            fitted.push(RivalEffect {
                 effect: *effect,
                 gain: [gain, se],
+                with,
+                after,
             });
-            // a part of the error is half of that of its square
-            let noticeable = gain > 2.0 * NUMBERS.noticeable;
-            if noticeable && gain > NUMBERS.screen * se {
-                fitted.push(RivalEffect {
-                    effect: *effect,
-                    gain: [gain, se],
-                    with,
-                    after,
-                });
-            }
         }
-        fitted.sort_by(|a: &RivalEffect, b| b.gain[0].total_cmp(&a.gain[0]));
-        settle_rivals(problem, &at, &before, &mut fitted);
-        let Some((first, others)) = fitted.split_first() else {
-            break;
-        };
-        let near = others.iter().filter(|other| other.is_near(first));
-        let alternatives = near.map(|other| other.effect).collect();
-        joined.push((first.effect, first.gain, alternatives));
-        at = fit(
-            problem,
-            &first.with.unknowns,
-            &first.with.values,
-            Some(&at.scales),
-        );
     }
-    let mut found = settle(problem, given, at, joined);
-    found.tried = tried;
-    found
+    fitted.sort_by(|a: &RivalEffect, b| b.gain[0].total_cmp(&a.gain[0]));
+    settle_rivals(problem, &law.at, &before, &mut fitted);
+    (fitted, tried)
 }
 
 /// Lets what is not sure leave, the least sure first, until all that stand pass.
@@ -366,7 +274,7 @@ fn settle(
     problem: &DriveProblem,
     given: LawEstimate,
     mut at: LawEstimate,
-    joined: Vec<(DriveEffect, [f64; 2], Vec<DriveEffect>)>,
+    joined: Vec<JoinedEffect>,
 ) -> FoundDrive {
     let mut steps: BTreeMap<usize, Step> = BTreeMap::new();
     let mut standing: Vec<usize> = (0..joined.len()).collect();
@@ -395,15 +303,6 @@ fn settle(
         steps: steps.into_values().collect(),
         tried: Vec::new(),
     }
-}
-
-/// A solution fitted anew without an effect.
-pub fn without(problem: &DriveProblem, at: &LawEstimate, effect: DriveEffect) -> LawEstimate {
-    let gone = effect.unknowns(problem.frame.joints);
-    let pairs = at.unknowns.iter().zip(&at.values);
-    let kept = pairs.filter(|(unknown, _)| !gone.contains(unknown));
-    let (unknowns, values): (Vec<DriveUnknown>, Vec<f64>) = kept.map(|(u, x)| (*u, *x)).unzip();
-    fit(problem, &unknowns, &values, Some(&at.scales))
 }
 
 /// A solution with another effect in the place of one of its own, fitted to the end; none where it does worse on the blocks

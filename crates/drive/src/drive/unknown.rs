@@ -105,6 +105,8 @@ pub struct UnknownFrame {
     pub joints: usize,
     /// vs of each joint [rad/s].
     pub stribeck_speed: Vec<f64>,
+    /// Longest step of a roll-out [s].
+    pub longest_step: f64,
     /// Numbers that are held: effects that are written smaller than they were estimated.
     pub held: Vec<(DriveUnknown, f64)>,
 }
