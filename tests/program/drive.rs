@@ -107,9 +107,16 @@ fn a_simulated_torque_drive_is_found_by_its_rig_and_gains() {
             .as_f64()
             .unwrap()
     };
-    assert!((value("armature") - 0.02).abs() < 2e-3);
-    assert!((value("coulomb") - 0.15).abs() < 0.015);
-    assert!((value("command_delay") - 0.02).abs() < 2e-3);
+    // what is held from one sample to the next is late, and looks like viscous friction
+    for (name, expected, within) in [
+        ("armature", 0.02, 2e-4),
+        ("coulomb", 0.15, 5e-3),
+        ("viscous", 0.05, 1e-3),
+        ("command_delay", 0.02, 2e-4),
+    ] {
+        let found = value(name);
+        assert!((found - expected).abs() < within, "{name} {found}");
+    }
 }
 
 #[test]
