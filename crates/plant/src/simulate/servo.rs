@@ -172,8 +172,9 @@ pub struct ServoRun {
 /// Rate of a log [Hz].
 const RATE_HZ: f64 = 200.0;
 
-/// Steps of the simulation between two rows of a log.
-const STEPS: usize = 100;
+/// Steps of the simulation between two rows of a log: a step of 50 us makes a loop late by a half of it, which an estimate of
+/// viscous friction sees.
+const STEPS: usize = 1000;
 
 /// Runs a motion at a gain.
 pub fn run_servo(
