@@ -151,7 +151,11 @@ pub fn lsq(
     notes.extend(settings.gains.iter().flat_map(|g| g.notes.clone()));
     let of_fit = consistent.iter().flat_map(ConsistentLinks::notes);
     let of_fit = of_fit
-        .chain((friction.is_none()).then_some(FitNote::FrictionFitted { law }))
+        .chain(
+            friction
+                .is_none()
+                .then_some(FitNote::FrictionFitted { law }),
+        )
         .chain(account.notes())
         .chain(held_by_parts(settings, &reduced));
     notes.extend(of_fit.map(StageNote::Fit));

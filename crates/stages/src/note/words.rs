@@ -293,3 +293,69 @@ impl Display for TrackNote {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::note::{FitNote, ModelNote, NumberWithStd};
+    use cft_ident_core::friction::plateau::MissedPlateau;
+
+    #[test]
+    fn a_note_is_a_sentence_without_a_full_stop_that_names_its_numbers() {
+        let [log, joint] = ["day.csv", "q4"].map(str::to_owned);
+        let number = |value, std| NumberWithStd { value, std };
+        let of_joint = |note| StageNote::Friction {
+            joint: joint.clone(),
+            note,
+        };
+        let missed = |v| MissedPlateau {
+            v,
+            torque: 2.5,
+            curve: 2.0,
+        };
+        let spans = vec![[0.0, 0.125]; 5];
+        let cases = [
+            (
+                StageNote::Log(LogNote::RowsLost {
+                    log: log.clone(),
+                    rows: 900,
+                    left_out: 0,
+                    losses: vec![RowLoss::Dropped(7, "sample-and-hold"), RowLoss::TooShort(3)],
+                }),
+                "day.csv: none of 900 rows is left out in all: 7 sample-and-hold, 3 in stretches too short to filter; see `cft-ident inspect`",
+            ),
+            (
+                StageNote::Log(LogNote::TooShort {
+                    log: log.clone(),
+                    stretches: 5,
+                    samples: 600,
+                    spans,
+                }),
+                "day.csv: 5 stretches between gaps, too short to filter, left out (600 samples; 0.000..0.125 s, 0.000..0.125 s, 0.000..0.125 s)",
+            ),
+            (
+                of_joint(FrictionNote::MissedPlateaus(
+                    (1..7).map(|v| missed(f64::from(v))).collect(),
+                )),
+                "q4: the friction curve misses the mean torque at constant speed: 2.50 at 1.0 (curve 2.00), 2.50 at 2.0 (curve 2.00), \
+                 2.50 at 3.0 (curve 2.00), 2.50 at 4.0 (curve 2.00) and 2 more speeds; do not use it at these speeds: the law cannot \
+                 follow this joint there, its friction depends on more than speed, or it changed between the logs",
+            ),
+            (
+                StageNote::Fit(FitNote::BelowZero {
+                    unknowns: vec![("coulomb:q4".to_owned(), number(-0.5, 0.1), "Nm".to_owned())],
+                }),
+                "the fit is unphysical, friction or inertia below zero: coulomb:q4 -0.50 +- 0.10 Nm; a torque is missing or a gain is wrong (`diagnose` looks for it), or the motion does not separate these parameters",
+            ),
+            (
+                StageNote::Model(ModelNote::ErrorsOfReduced { log }),
+                "day.csv is a reduced log: the errors of single rows (the largest, R2, those before the filter) are not known of it",
+            ),
+        ];
+        for (note, sentence) in cases {
+            let text = note.to_string();
+            assert_eq!(text, sentence);
+            assert!(!text.ends_with('.'), "{text}");
+        }
+    }
+}
