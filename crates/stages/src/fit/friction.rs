@@ -152,7 +152,7 @@ pub fn friction(
     machine.check_gains()?;
     each_row_once(machine, &[("fit", logs)])?;
     let (groups, inputs, of_logs) = by_joint(machine, logs, settings, control)?;
-    let mut notes: Vec<StageNote> = machine.notes().chain(of_logs).collect();
+    let mut notes: Vec<StageNote> = StageNote::of_robot(&machine.file).chain(of_logs).collect();
     let work = control.begin("friction filter", Some(groups.len() as u64));
     let parameters = machine.robot.parameters().iter();
     let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();

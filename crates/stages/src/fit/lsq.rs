@@ -147,7 +147,7 @@ pub fn lsq(
         .view_mut((0, 0), (u, u))
         .copy_from(&fit.covariance);
     let mut notes = passes.contacts()?;
-    notes.extend(machine.notes());
+    notes.extend(StageNote::of_robot(&machine.file));
     notes.extend(settings.gains.iter().flat_map(|g| g.notes.clone()));
     let of_fit = consistent.iter().flat_map(ConsistentLinks::notes);
     let of_fit = of_fit

@@ -14,7 +14,6 @@ use super::log::Log;
 use super::open_log::OpenLog;
 use super::reference::LoggedReference;
 use super::speeds::SpeedMeter;
-use crate::note::StageNote;
 use cft_ident_core::friction::estimate::NARROWER;
 use cft_ident_core::motion::{
     DifferenceFormula, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold,
@@ -120,16 +119,6 @@ impl LoggedRobot {
             joints: joints.join(", "),
             unit,
         })
-    }
-
-    /// What was taken otherwise than its file writes it.
-    pub(crate) fn notes(&self) -> impl Iterator<Item = StageNote> {
-        self.file
-            .notes
-            .0
-            .iter()
-            .cloned()
-            .map(StageNote::OfRobotFile)
     }
 
     /// Looks at a log before it is used, once.

@@ -6,6 +6,7 @@ use crate::band::{BeyondSeen, Reach};
 use crate::setup::{Finding, FoundTorqueLimit, FrictionPower};
 use cft_ident_core::friction::plateau::MissedPlateau;
 use cft_ident_core::math::descent::IterationEnding;
+use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::inspect::RowCost;
 
@@ -33,6 +34,11 @@ pub enum StageNote {
 }
 
 impl StageNote {
+    /// What was taken otherwise than a robot file writes it.
+    pub(crate) fn of_robot(file: &RobotFile) -> impl Iterator<Item = StageNote> {
+        file.notes.0.iter().cloned().map(StageNote::OfRobotFile)
+    }
+
     /// The joints that leave what was seen of them; that there is no band where nothing was.
     pub(crate) fn of_reach(reach: Option<&Reach>) -> Vec<StageNote> {
         let notes = match reach {
