@@ -23,8 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         &FrictionSettings::default(),
         &Control::default(),
     )?;
-    for warning in &found.warnings {
-        eprintln!("{warning}");
+    for note in &found.notes {
+        eprintln!("{note}");
     }
     for joint in &found.joints {
         for (name, parameter) in joint.parameters.each() {

@@ -7,11 +7,13 @@ use std::sync::atomic::AtomicBool;
 use cft_ident::cli;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
-    self, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings, LoggedRobot,
-    LsqSettings, ReducedLogs, RobotSources, TrackSource, ValidateSettings, check_setup,
+    self, AcceptedSetup, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings,
+    IdentifyError, LoggedRobot, LsqSettings, ReducedLogs, RobotSources, SetupRefusal, TrackSource,
+    ValidateSettings, accepted_setup,
 };
-use cft_ident::report::json::JsonDocument;
+use cft_ident::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident::report::{Report, stages};
+use cft_ident::setup::Finding;
 use pyo3::prelude::*;
 
 use crate::data::{Log, Model, Part, Robot};
@@ -29,36 +31,18 @@ fn all(logs: &[PyRef<'_, Log>]) -> Vec<identify::Log> {
     logs.iter().flat_map(|log| log.logs.clone()).collect()
 }
 
-/// Findings of the check of the set-up, and its warnings.
-#[derive(Default)]
-struct Checked {
-    findings: Vec<cft_ident::setup::Finding>,
-    warnings: Vec<String>,
-    /// The robot with torques that its drives do not exceed, where the logs ask for more.
-    limited: Option<LoggedRobot>,
-}
-
-/// Refuses a set-up that the torques plainly contradict, as the commands do.
-fn checked(data: &Dataset, control: &Control) -> PyResult<Checked> {
-    // of logs that cannot be checked the fit itself says why
-    let found = check_setup(data, control).unwrap_or_default();
-    let report = found.report;
-    control.check().map_err(of_stage)?;
-    if let Some(finding) = report.refusals().next() {
-        return Err(InputError::new_err(format!(
-            "{}: the torques contradict the robot file: {}; or go on without by as_declared=True",
-            data.machine.name,
-            finding.in_words()
-        )));
-    }
-    let likely = report.findings.iter().filter(|f| !f.sure);
-    let likely = likely.map(|f| format!("the set-up may be wrong: {}", f.in_words()));
-    let power = report.friction_power.iter().map(|power| power.sentence());
-    let limits = report.torque_limits.iter().map(|limit| limit.sentence());
-    Ok(Checked {
-        warnings: likely.chain(power).chain(limits).collect(),
-        findings: report.findings,
-        limited: found.limited,
+/// What a fit goes on with; refuses a set-up that the torques plainly contradict, as the commands do.
+fn accepted(data: Dataset, control: &Control) -> PyResult<AcceptedSetup> {
+    accepted_setup(data, control).map_err(|refusal| match refusal {
+        SetupRefusal::Interrupted => of_stage(IdentifyError::Interrupted),
+        SetupRefusal::Contradicted(found) => {
+            let first = found.report.refusals().next();
+            InputError::new_err(format!(
+                "{}: the torques contradict the robot file: {}; or go on without by as_declared=True",
+                found.data.machine.name,
+                first.map(Finding::in_words).unwrap_or_default()
+            ))
+        }
     })
 }
 
@@ -101,22 +85,16 @@ pub fn friction(
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
     let old = model.map(|m| m.given.file.clone());
     work::run(py, move |control, _| {
-        let data = Dataset::new(&machine, &logs);
-        let setup = match as_declared {
-            true => Checked::default(),
-            false => checked(&data, control)?,
-        };
-        let machine = setup.limited.unwrap_or(machine);
-        let data = Dataset::new(&machine, &logs);
+        let setup = accepted(Dataset::new(&machine, &logs), control)?;
+        let machine = &setup.data.machine;
         let settings = FrictionSettings { joint };
-        let mut found = identify::friction(&data, &settings, control).map_err(of_stage)?;
-        found.setup = setup.findings;
-        found.warnings.splice(0..0, setup.warnings);
-        let model = found.model(&machine, old.as_ref());
-        let document = JsonDocument::new("friction", &found.inputs, &found.warnings, &found);
+        let mut found = identify::friction(&setup.data, &settings, control).map_err(of_stage)?;
+        setup.put_before(&mut found.setup, &mut found.notes);
+        let model = found.model(machine, old.as_ref());
+        let document = JsonDocument::new("friction", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::friction::friction(&stages::friction::Friction {
-            machine: &machine,
+            machine,
             found: &found,
             file: &model,
             path: "friction.toml",
@@ -173,13 +151,8 @@ pub fn lsq(
                 .belongs_to(&given.name, &machine.file)
                 .map_err(of_input)?;
         }
-        let data = Dataset::new(&machine, &logs);
-        let setup = match as_declared {
-            true => Checked::default(),
-            false => checked(&data, control)?,
-        };
-        let machine = setup.limited.unwrap_or(machine);
-        let data = Dataset::new(&machine, &logs);
+        let setup = accepted(Dataset::new(&machine, &logs), control)?;
+        let machine = &setup.data.machine;
         let settings = LsqSettings {
             estimator: kind,
             consistent: !unconstrained,
@@ -187,14 +160,13 @@ pub fn lsq(
             hold_friction,
             ..LsqSettings::default()
         };
-        let mut found = identify::lsq(&data, &settings, control).map_err(of_stage)?;
-        found.setup.splice(0..0, setup.findings);
-        found.warnings.splice(0..0, setup.warnings);
-        let model = found.model(&machine, friction.as_ref().map(|given| &given.file));
-        let document = JsonDocument::new("lsq", &found.inputs, &found.warnings, &found);
+        let mut found = identify::lsq(&setup.data, &settings, control).map_err(of_stage)?;
+        setup.put_before(&mut found.setup, &mut found.notes);
+        let model = found.model(machine, friction.as_ref().map(|given| &given.file));
+        let document = JsonDocument::new("lsq", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::lsq::lsq(&stages::lsq::LsqReport {
-            machine: &machine,
+            machine,
             found: &found,
             file: &model,
             path: "model.toml",
@@ -224,7 +196,7 @@ pub fn validate(
         };
         let found = identify::validate(&data, &settings, control, &mut |_, _| {});
         let found = found.map_err(of_stage)?;
-        let document = JsonDocument::new("validate", &found.inputs, &found.warnings, &found);
+        let document = JsonDocument::new("validate", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::validate::validate(&stages::validate::ValidateReport {
             machine: &data.machine,
@@ -262,14 +234,14 @@ pub fn diagnose(
         let end = identify::diagnose(&data, &settings, control).map_err(of_stage)?;
         match end {
             DiagnoseEnd::DataFault(fault) => {
-                let document = JsonDocument::new("diagnose", &[], &[], &fault.result());
+                let document = JsonDocument::new("diagnose", &[], &NO_WARNINGS, &fault.result());
                 let report = stages::diagnose::data_fault(&fault, &given);
                 Ok((shown(&document.map_err(of_input)?, &report), None))
             }
             DiagnoseEnd::Diagnosed(found) => {
-                let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
+                let (inputs, notes) = (&found.in_memory.inputs, &found.in_memory.notes);
                 let result = found.result(&machine);
-                let document = JsonDocument::new("diagnose", inputs, warnings, &result);
+                let document = JsonDocument::new("diagnose", inputs, notes, &result);
                 let refined = found.model(&machine, file);
                 let report = stages::diagnose::diagnose(&stages::diagnose::DiagnoseReport {
                     machine: &machine,
@@ -300,12 +272,7 @@ pub fn reduce(
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
     let friction = model.map(|m| m.given.clone());
     work::run(py, move |control, _| {
-        let data = Dataset::new(&machine, &logs);
-        let setup = match as_declared {
-            true => Checked::default(),
-            false => checked(&data, control)?,
-        };
-        let data = Dataset::new(&setup.limited.unwrap_or(machine), &logs);
+        let data = accepted(Dataset::new(&machine, &logs), control)?.data;
         let found = identify::reduce(&data, friction.as_ref(), control).map_err(of_stage)?;
         Ok(Part {
             logs: Arc::new(found),
@@ -347,7 +314,7 @@ pub fn track(
     }
     work::run(py, move |control, _| {
         let found = identify::track(&all, control).map_err(of_stage)?;
-        let document = JsonDocument::new("track", &found.inputs, &found.warnings, &found);
+        let document = JsonDocument::new("track", &found.inputs, &found.notes, &found);
         let report = stages::track::track(&found);
         Ok(shown(&document.map_err(of_input)?, &report))
     })

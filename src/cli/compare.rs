@@ -66,7 +66,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(tried) = &of.tried {
         read.extend(tried.in_memory.inputs.iter().cloned());
     }
-    let document = JsonDocument::new("compare", &read, &of.warnings, &of.result())?;
+    let document = JsonDocument::new("compare", &read, &of.notes, &of.result())?;
     let names = names_of(&args.logs);
     let shown: Vec<String> = names.iter().map(|name| escape(name)).collect();
     let mut report = stages::compare::compare(&of, &shown.join(", "));

@@ -242,7 +242,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let file = machine.as_ref().map(|machine| &machine.file);
     let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
     let (layout, mut provenance) = (file.map(|file| file.layout()), Vec::new());
-    warnings.extend(repeated_rows(&logs_of(&args.logs), layout.as_ref()));
+    let repeated = repeated_rows(&logs_of(&args.logs), layout.as_ref());
+    warnings.extend(repeated.iter().map(ToString::to_string));
     for spec in &args.logs {
         provenance.push(match &machine {
             None => as_it_stands(spec, args, &mut target, &mut warnings, context)?,

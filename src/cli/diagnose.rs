@@ -7,7 +7,7 @@ use super::{
 };
 use cft_ident_core::diagnose::DiagnosisOptions;
 use cft_ident_logs::log::LogSpec;
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident_report::report::sections::{provenance, quality, residual};
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{
@@ -112,7 +112,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             if let Some(path) = &args.report {
                 let mut page = report.page();
                 let found = pictures::inspected(specs, &machine, context)?;
-                quality::section(&mut page, &found, &[]);
+                quality::section(&mut page, &found, &NO_WARNINGS);
                 let (inputs, made_from) = ([given.provenance], &file.provenance.inputs);
                 let (robot, command) = (&machine.file, &context.command);
                 provenance::section(&mut page, robot, &inputs, made_from, None, command);
@@ -122,11 +122,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 setup,
                 ..fault.result()
             };
-            let document = JsonDocument::new("diagnose", &[], &[], &result)?;
+            let document = JsonDocument::new("diagnose", &[], &NO_WARNINGS, &result)?;
             return Ok(Outcome::new(report.text_for(context.screen), document));
         }
     };
-    let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
+    let (inputs, notes) = (&found.in_memory.inputs, &found.in_memory.notes);
     let plain = found.result(&machine);
     let result = DiagnosisResult {
         setup,
@@ -137,7 +137,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         faults: fault.into_iter().collect(),
         ..plain
     };
-    let document = JsonDocument::new("diagnose", inputs, warnings, &result)?;
+    let document = JsonDocument::new("diagnose", inputs, notes, &result)?;
     let refined = found.model(&machine, file);
     let written = args.output.as_ref().unwrap_or(&args.model);
     let of = stages::diagnose::DiagnoseReport {

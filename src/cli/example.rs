@@ -12,7 +12,7 @@ use cft_ident_logs::log::unpacked;
 use cft_ident_plant::simulate::held::SimulatedHolds;
 use cft_ident_plant::simulate::servo::{BenchMotion, ServoPlant, ServoRig, run_servo};
 use cft_ident_plant::simulate::wrist::SimulatedTool;
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident_report::report::table::{CellAlignment, Table};
 
 const EXAMPLE: &str = "\
@@ -343,7 +343,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         examples: known().collect(),
         written,
     };
-    let document = JsonDocument::new("example", &[], &[], &result)?;
+    let document = JsonDocument::new("example", &[], &NO_WARNINGS, &result)?;
     Ok(Outcome::new(text, document))
 }
 

@@ -482,7 +482,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     warnings.extend(described);
     if let Some(along) = along {
         inputs.extend(along.inputs);
-        warnings.extend(along.warnings);
+        warnings.extend(along.notes.iter().map(ToString::to_string));
     }
     let text = table.to_string() + &beyond_table(&result.beyond);
     let files: Vec<&str> = result.files.iter().map(|of| of.file.as_str()).collect();

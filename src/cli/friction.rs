@@ -70,13 +70,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let data = Dataset::new(&machine, &logs_of(&args.logs));
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
-    let machine = &checked.data.machine;
-    let mut found = identify::friction(&checked.data, &settings, &context.control)?;
-    found.setup.clone_from(&checked.report.findings);
-    let before = checked.warnings.iter().cloned();
-    found.warnings.splice(0..0, before);
+    let machine = &checked.setup.data.machine;
+    let mut found = identify::friction(&checked.setup.data, &settings, &context.control)?;
+    let setup = &checked.setup;
+    setup.put_before(&mut found.setup, &mut found.notes);
     let model = found.model(machine, old.as_ref());
-    let document = JsonDocument::new("friction", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("friction", &found.inputs, &found.notes, &found)?;
     let of = stages::friction::Friction {
         machine,
         found: &found,

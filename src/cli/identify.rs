@@ -279,12 +279,12 @@ fn execute(
     stages.begin("set-up");
     let data = Dataset::new(&work.machine, &logs_of(&training));
     let checked = setup::checked(data, (&work.robot, &[]), &with_draft, context)?;
-    warnings.extend(checked.warnings.iter().cloned());
+    warnings.extend(checked.setup.notes.iter().map(ToString::to_string));
     match (work.draft, &checked.new_file) {
         (Some(text), None) => out.write("robot.toml", &text)?,
         (Some(_), Some((_, text))) => {
             let head = "the torques contradict the names of the columns, and were followed";
-            let refusals = checked.report.refusals();
+            let refusals = checked.setup.report.refusals();
             guesses.extend(refusals.map(|found| format!("{head}: {}", found.in_words())));
             out.write("robot.toml", text)?;
         }
@@ -293,7 +293,7 @@ fn execute(
     if let Some(text) = work.shipped {
         out.write("robot.toml", text)?;
     }
-    let machine = checked.data.machine;
+    let machine = checked.setup.data.machine;
     let data = Dataset {
         one_joint: of_friction,
         ..Dataset::new(&machine, &fitted_logs).with_held_out(&logs_of(&unseen))
@@ -321,7 +321,7 @@ fn execute(
         keep(end, &machine, &title, &mut out)
     })?;
     stages.begin("report");
-    warnings.extend(found.warnings.iter().cloned());
+    warnings.extend(found.notes.iter().map(ToString::to_string));
     let (mut diagnosis, mut replayed_diagnosis) = (None, None);
     match &found.diagnosed {
         Ok(DiagnoseEnd::DataFault(fault)) => diagnosis = Some(fault.result()),
@@ -395,7 +395,7 @@ fn execute(
     out.files.push("result.json".into());
     let latest = found.refined.as_ref().unwrap_or(&found.model);
     let result = StageResults {
-        setup: &checked.report.findings,
+        setup: &checked.setup.report.findings,
         guesses: (!guesses.is_empty()).then_some(&guesses[..]),
         friction: found.friction.as_ref().map(|(laws, _)| laws),
         lsq: &found.dynamics,

@@ -266,7 +266,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let file = known.as_ref().map(|known| &known.machine.file);
     let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
     let layout = file.map(|file| file.layout());
-    warnings.extend(repeated_rows(&logs_of(&args.logs), layout.as_ref()));
+    let repeated = repeated_rows(&logs_of(&args.logs), layout.as_ref());
+    warnings.extend(repeated.iter().map(ToString::to_string));
     for spec in &args.logs {
         // What several machines recorded is no one log: each is looked at on its own.
         let machines = match &known {

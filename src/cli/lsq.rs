@@ -115,16 +115,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &edits), &args.setup, context)?;
-    let (machine, logs) = (&checked.data.machine, &checked.data.logs);
-    let mut found = identify::lsq(&checked.data, &settings, &context.control)?;
-    let (findings, warnings) = (&checked.report.findings, &checked.warnings);
-    found.setup.splice(0..0, findings.iter().cloned());
-    found.warnings.splice(0..0, warnings.iter().cloned());
+    let data = &checked.setup.data;
+    let (machine, logs) = (&data.machine, &data.logs);
+    let mut found = identify::lsq(data, &settings, &context.control)?;
+    let setup = &checked.setup;
+    setup.put_before(&mut found.setup, &mut found.notes);
     let mut model = found.model(machine, known.map(|given| &given.file));
     if args.open_loop.is_some() && !args.unconstrained {
         identify::project(&mut model)?;
     }
-    let document = JsonDocument::new("lsq", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("lsq", &found.inputs, &found.notes, &found)?;
     let names = names_of(&args.logs);
     let of = stages::lsq::LsqReport {
         machine,

@@ -73,7 +73,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     Ok(Outcome::new(
         report.text_for(context.screen),
-        JsonDocument::new("payload", &found.inputs, &found.warnings, &found)?,
+        JsonDocument::new("payload", &found.inputs, &found.notes, &found)?,
     ))
 }
 

@@ -10,7 +10,9 @@ use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::Report;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::table::{CellAlignment, Table};
-use cft_ident_stages::identify::{self, Dataset, FORMAT, LoggedRobot, MadeWith, ReducedLogs};
+use cft_ident_stages::identify::{
+    self, Dataset, FORMAT, LoggedRobot, MadeWith, ReducedLogs, StageNote,
+};
 use cft_ident_stages::setup::Finding;
 
 const EXAMPLE: &str = "\
@@ -85,7 +87,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let data = Dataset::new(&machine, &logs(&args.logs)?);
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
-    let found = identify::reduce(&checked.data, known, &context.control)?;
+    let setup = &checked.setup;
+    let found = identify::reduce(&setup.data, known, &context.control)?;
     context.check()?;
     let bytes = found.to_bytes().map_err(identify::IdentifyError::from)?;
     let result = ReducedFile {
@@ -94,12 +97,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             .ok_or_else(|| CliError::usage("no log is given"))?,
         logs: found.logs().iter().map(|log| in_file(log)).collect(),
         bytes: bytes.len() as u64,
-        setup: checked.report.findings.clone(),
+        setup: setup.report.findings.clone(),
     };
-    let shown = found.logs().iter().flat_map(|log| log.warnings.clone());
-    let warnings: Vec<String> = checked.warnings.iter().cloned().chain(shown).collect();
+    let of_logs = found.logs().iter().flat_map(|log| &log.notes);
+    let notes: Vec<&StageNote> = setup.notes.iter().chain(of_logs).collect();
     let inputs: Vec<Provenance> = found.logs().iter().map(|l| l.provenance.clone()).collect();
-    let document = JsonDocument::new("reduce", &inputs, &warnings, &result)?;
+    let document = JsonDocument::new("reduce", &inputs, &notes, &result)?;
     checked.write(context)?;
     context.files.write(&args.output, &bytes)?;
     Ok(Outcome::new(
@@ -114,7 +117,7 @@ fn in_file(log: &identify::ReducedLog) -> LogInFile {
         bounds_s: log.bounds_s,
         blocks: log.blocks(),
         rows: log.summary.rows,
-        faults: log.warnings.clone(),
+        faults: log.notes.iter().map(ToString::to_string).collect(),
     }
 }
 

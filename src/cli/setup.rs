@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use super::{CliError, Context};
 use cft_ident_files::config::correction::{KeyEdit, edited};
 use cft_ident_files::config::{self, RobotFile};
-use cft_ident_stages::identify::{CheckedSetup, Dataset, IdentifyError, LoggedRobot, check_setup};
-use cft_ident_stages::setup::{
-    Finding, FindingSeverity, FoundTorqueLimit, FrictionPower, SetupReport,
+use cft_ident_stages::identify::{
+    AcceptedSetup, ContradictedSetup, Dataset, IdentifyError, SetupRefusal, accepted_setup,
+    check_setup,
 };
+use cft_ident_stages::setup::{Finding, FindingSeverity, SetupReport};
 
 /// What to do with a set-up that the torques contradict.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -21,12 +22,9 @@ pub struct SetupArgs {
     pub as_declared: bool,
 }
 
-/// Logs whose set-up was checked, with what was found.
+/// A set-up that was checked, and the robot file that comes of it.
 pub struct CheckedDataset {
-    /// The robot to go on with, and the logs.
-    pub data: Dataset,
-    pub report: SetupReport,
-    pub warnings: Vec<String>,
+    pub setup: AcceptedSetup,
     /// The new robot file, where one is to be written.
     pub new_file: Option<(PathBuf, String)>,
 }
@@ -56,71 +54,60 @@ pub fn checked(
         },
         false => data,
     };
-    let machine = &data.machine;
-    machine.check_gains()?;
-    let CheckedSetup {
-        report,
-        corrected,
-        edits,
-        limited,
-    } = check(&data, context)?;
-    let of = |severity| (report.findings.iter()).filter(move |f| f.severity == severity);
-    let likely = |f: &Finding| {
-        format!(
-            "the set-up may be wrong: {}; the set-up as declared is possible too, and the fit goes on with it",
-            f.in_words()
-        )
+    data.machine.check_gains()?;
+    let setup = match accepted_setup(data, &context.control) {
+        Ok(setup) => setup,
+        Err(SetupRefusal::Interrupted) => return Err(CliError::interrupted()),
+        Err(SetupRefusal::Contradicted(found)) => {
+            return put_right(*found, (robot, before), args, context);
+        }
     };
-    let mut warnings: Vec<String> = of(FindingSeverity::Warning).map(likely).collect();
-    of(FindingSeverity::Hint).for_each(|f| context.note(&format!("hint: {}", f.in_words())));
-    warnings.extend(report.friction_power.iter().map(FrictionPower::sentence));
-    warnings.extend(report.torque_limits.iter().map(FoundTorqueLimit::sentence));
-    let refusals: Vec<&Finding> = report.refusals().collect();
-    if refusals.is_empty() {
-        let path = args.fix_setup.as_ref().filter(|_| !before.is_empty());
-        let new_file = path.map(|path| {
-            let text = new_text(robot, before, &machine.file, path)?;
-            Ok::<_, CliError>((path.clone(), text))
-        });
-        let new_file = new_file.transpose()?;
-        let data = match limited {
-            Some(machine) => Dataset { machine, ..data },
-            None => data,
-        };
-        return Ok(CheckedDataset {
-            data,
-            report,
-            warnings,
-            new_file,
-        });
-    }
-    let (Some(path), Some(corrected)) = (&args.fix_setup, corrected) else {
+    tell_hints(&setup.report, context);
+    let path = args.fix_setup.as_ref().filter(|_| !before.is_empty());
+    let new_file = path.map(|path| {
+        let text = new_text(robot, before, &setup.data.machine.file, path)?;
+        Ok::<_, CliError>((path.clone(), text))
+    });
+    let new_file = new_file.transpose()?;
+    Ok(CheckedDataset { setup, new_file })
+}
+
+/// A set-up that the torques contradict, put right where that is asked for.
+fn put_right(
+    found: ContradictedSetup,
+    (robot, before): (&Path, &[KeyEdit]),
+    args: &SetupArgs,
+    context: &Context,
+) -> Result<CheckedDataset, CliError> {
+    tell_hints(&found.report, context);
+    let (Some(path), Some(corrected)) = (&args.fix_setup, &found.corrected) else {
+        let refusals: Vec<&Finding> = found.report.refusals().collect();
         return Err(refused(robot, &refusals));
     };
-    let edits = [before, &edits].concat();
-    let text = new_text(robot, &edits, &corrected, path)?;
-    let right = |f: &&Finding| format!("put right in {}: {}", path.display(), f.in_words());
-    warnings.extend(refusals.iter().map(right));
-    let machine = LoggedRobot::new(&path.to_string_lossy(), corrected);
+    let edits = [before, &found.edits].concat();
+    let text = new_text(robot, &edits, corrected, path)?;
+    let corrected = corrected.clone();
     Ok(CheckedDataset {
-        data: Dataset { machine, ..data },
-        report,
-        warnings,
+        setup: found.put_right(&path.to_string_lossy(), corrected),
         new_file: Some((path.clone(), text)),
     })
 }
 
-/// The check; logs that cannot be checked are reported by the fit itself.
-fn check(data: &Dataset, context: &Context) -> Result<CheckedSetup, CliError> {
-    match check_setup(data, &context.control) {
-        Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
-        found => Ok(found.unwrap_or_default()),
+/// Tells what is no fault.
+fn tell_hints(report: &SetupReport, context: &Context) {
+    let hint = |f: &&Finding| f.severity == FindingSeverity::Hint;
+    for hint in report.findings.iter().filter(hint) {
+        context.note(&format!("hint: {}", hint.in_words()));
     }
 }
 
 /// What the check says of these logs, for a command that only reports it.
 pub fn report(data: &Dataset, context: &Context) -> Result<SetupReport, CliError> {
-    Ok(check(data, context)?.report)
+    match check_setup(data, &context.control) {
+        Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
+        // logs that cannot be checked are reported by the stage itself
+        found => Ok(found.unwrap_or_default().report),
+    }
 }
 
 /// Text of the new robot file: the user's with the lines that differ, else the whole anew.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{CliError, Context, Outcome, arguments, files, written};
 use cft_ident_files::config::model_file::{EffectSection, Parameter};
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{JointInUse, in_use};
@@ -76,6 +76,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     Ok(Outcome::new(
         report.text_for(context.screen),
-        JsonDocument::new("show", &inputs, &[], &shown)?,
+        JsonDocument::new("show", &inputs, &NO_WARNINGS, &shown)?,
     ))
 }

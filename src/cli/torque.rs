@@ -132,7 +132,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let mut inputs = found.inputs.clone();
     inputs.splice(0..0, trajectory);
-    let document = JsonDocument::new("torque", &inputs, &found.warnings, &found.along)?;
+    let document = JsonDocument::new("torque", &inputs, &found.notes, &found.along)?;
     context.files.add_log(out)?;
     let mut report = Report::new(&format!("Torque along {}", escape(&args.log.name())));
     report.everywhere().table(table);

@@ -39,7 +39,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs::listed(args.output.as_deref(), &[], args.report.as_deref());
     context.check_outputs(args.files.iter().map(PathBuf::as_path), outputs)?;
     let found = identify::track(&robots(args, context)?, &context.control)?;
-    let document = JsonDocument::new("track", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("track", &found.inputs, &found.notes, &found)?;
     let mut report = stages::track::track(&found);
     stages::track::origin(&mut report.page(), &found, &context.command);
     context.check()?;

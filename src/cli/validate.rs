@@ -157,7 +157,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         return Err(error.into());
     }
     let names = names_of(&args.logs);
-    let document = JsonDocument::new("validate", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("validate", &found.inputs, &found.notes, &found)?;
     let model_path = typed::quoted(&args.model.to_string_lossy());
     let unseen = args
         .logs

@@ -207,7 +207,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         written(&mut report, path);
     }
     let text = report.text_for(context.screen);
-    let document = JsonDocument::new("watch", &found.inputs, &found.warnings, &found)?;
+    let document = JsonDocument::new("watch", &found.inputs, &found.notes, &found)?;
     if let Some(error) = found.error.take() {
         let error = CliError::from(error).hint("the results before it are printed above");
         context.end_with(error);

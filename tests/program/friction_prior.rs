@@ -234,8 +234,8 @@ fn speeds_beyond_those_of_the_one_joint_logs_are_reported_with_the_torque_that_i
     };
     model.friction_prior = vec![speeds([0.002, 0.27])];
     let shown = |found: &IdentifiedDynamics| {
-        let mut all = found.warnings.iter();
-        all.any(|w| w.contains("its one-joint logs at up to 0.27"))
+        let mut all = found.notes.iter();
+        all.any(|note| (note.to_string()).contains("its one-joint logs at up to 0.27"))
     };
     assert!(shown(&fitted(&model, 15, EstimatorKind::Wls)));
     model.friction_prior = vec![speeds([0.002, 1.5])];

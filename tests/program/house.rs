@@ -51,42 +51,43 @@ const ROOMS: &[(&str, &str)] = &[
         "held",
         "explain number verdict robot block judge log config tool",
     ),
+    ("note", "math number config friction inspect setup band"),
     (
         "input",
-        "explain math block verdict number robot log config motion effect friction inertia judge diagnose validate \
+        "note explain math block verdict number robot log config motion effect friction inertia judge diagnose validate \
          inspect setup open_loop track",
     ),
     (
         "held_out",
-        "input explain math block verdict number robot log config motion effect friction inertia judge validate \
+        "note input explain math block verdict number robot log config motion effect friction inertia judge validate \
          inspect compare band observe open_loop",
     ),
     (
         "fit",
-        "input held_out explain math block verdict number robot log config motion effect friction inertia \
+        "note input held_out explain math block verdict number robot log config motion effect friction inertia \
          judge diagnose validate inspect setup band open_loop",
     ),
     (
         "find",
-        "input held_out fit explain math block verdict number robot log config motion effect friction inertia \
+        "note input held_out fit explain math block verdict number robot log config motion effect friction inertia \
          judge diagnose validate inspect setup open_loop",
     ),
     (
         "fleet",
-        "input fit explain math block verdict robot log config motion inertia track",
+        "note input fit explain math block verdict robot log config motion inertia track",
     ),
     (
         "watch",
-        "input held_out math block number robot log config motion effect export band observe",
+        "note input held_out math block number robot log config motion effect export band observe",
     ),
     (
         "campaign",
-        "input held_out fit find explain math verdict robot log config effect diagnose",
+        "note input held_out fit find explain math verdict robot log config effect diagnose",
     ),
     // the door of them all
     (
         "identify",
-        "compare diagnose input held_out fit find fleet watch campaign",
+        "compare diagnose note input held_out fit find fleet watch campaign",
     ),
     (
         "replay",
@@ -95,12 +96,12 @@ const ROOMS: &[(&str, &str)] = &[
     (
         "report",
         "explain math verdict number robot log config motion effect friction inertia diagnose validate \
-         inspect setup excite compare input held_out fit find fleet watch campaign band observe open_loop track replay drive tool held",
+         inspect setup excite compare note input held_out fit find fleet watch campaign band observe open_loop track replay drive tool held",
     ),
     (
         "cli",
         "explain math block verdict number robot log config output motion effect friction inertia diagnose \
-         validate inspect mapping setup simulate excite compare input held_out fit find fleet watch campaign identify report export band \
+         validate inspect mapping setup simulate excite compare note input held_out fit find fleet watch campaign identify report export band \
          observe open_loop track replay drive tool held",
     ),
 ];

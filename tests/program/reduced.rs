@@ -10,7 +10,7 @@ use cft_ident::config::model_file::Parameter;
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
     Control, Dataset, GivenModel, IdentifiedDynamics, Log, LoggedRobot, LsqSettings, ReducedLogs,
-    ValidateSettings, Validated, lsq, new_model, reduce, validate,
+    StageNote, ValidateSettings, Validated, lsq, new_model, reduce, validate,
 };
 use cft_ident::log::LogSpec;
 use cft_ident::robot::friction::DoubleTanh;
@@ -220,12 +220,8 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
     let parts = reduced(&machine, &logs, Some(&model)).as_logs();
     let of_parts = fitted(&machine, &parts, &settings(false));
     same_fit(&of_parts, &whole);
-    let shown = |w: &&String| w.contains("--hold-friction");
-    assert!(
-        of_parts.warnings.iter().any(|w| shown(&w)),
-        "{:?}",
-        of_parts.warnings
-    );
+    let shown = |note: &StageNote| note.to_string().contains("--hold-friction");
+    assert!(of_parts.notes.iter().any(shown), "{:?}", of_parts.notes);
     let std = whole.fit.covariance[(0, 0)].sqrt();
     assert!(std > 2.0 * whole.fit.textbook[(0, 0)].sqrt(), "{std}");
     // validation of the model that was fitted, by the parts and by the logs

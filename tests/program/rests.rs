@@ -3,8 +3,8 @@
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, ValidateSettings, lsq, read_whole,
-    validate,
+    Control, Dataset, FitNote, GivenModel, Log, LoggedRobot, LsqSettings, StageNote,
+    ValidateSettings, lsq, read_whole, validate,
 };
 
 const MASS: f64 = 12.0;
@@ -91,8 +91,11 @@ fn rests_do_not_move_the_friction_and_are_distinguished_in_the_errors() {
             u.fitted_std
         );
     }
-    let shown = |text: &String| text.contains("at a reversal were ignored: slide");
-    assert!(found.warnings.iter().any(shown), "{:?}", found.warnings);
+    let shown = |note: &StageNote| {
+        let text = note.to_string();
+        text.contains("at a reversal were ignored: slide")
+    };
+    assert!(found.notes.iter().any(shown), "{:?}", found.notes);
     let fitted = &found.joints[0];
     let (moving, rest) = (fitted.relative_error_moving, fitted.relative_error_rest);
     assert!(moving.unwrap() < 0.05, "{fitted:?}");
@@ -148,5 +151,6 @@ fn a_log_without_rests_has_no_error_at_rest() {
     let fitted = &found.fit.relative_error[0];
     assert_eq!(fitted.rest, None);
     assert_eq!(fitted.moving, Some(fitted.all));
-    assert!(!found.warnings.iter().any(|w| w.contains("at rest")));
+    let rests = |note: &StageNote| matches!(note, StageNote::Fit(FitNote::AtRest { .. }));
+    assert!(!found.notes.iter().any(rests));
 }

@@ -11,6 +11,7 @@ use crate::input::error::IdentifyError;
 use crate::input::error_kind::ErrorKind;
 use crate::input::model::new_model;
 use crate::input::repeated::{each_row_once, without_rows_of};
+use crate::note::StageNote;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::campaign::EstimatorKind;
@@ -52,7 +53,7 @@ pub struct Campaigned {
     /// The model with the effects that were found, where there are some.
     pub refined: Option<ModelFile>,
     pub inputs: Vec<Provenance>,
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// Runs a campaign; without one-joint logs friction is fitted with the inertias. Friction is fitted again beside an effect, so the diagnosis has the one-joint logs
@@ -73,10 +74,10 @@ pub fn identify<E: From<IdentifyError>>(
     ] {
         each_row_once(machine, &[(role, fitted), validation])?;
     }
-    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
-    let mut keep = |from: &[Provenance], shown: &[String], role: DataRole| {
+    let (mut inputs, mut notes) = (Vec::new(), Vec::new());
+    let mut keep = |from: &[Provenance], noted: &[StageNote], role: DataRole| {
         inputs.extend(from.iter().cloned().map(|input| input.used_as(role)));
-        warnings.extend_from_slice(shown);
+        notes.extend_from_slice(noted);
     };
     let known = match data.one_joint.as_slice() {
         [] => None,
@@ -86,7 +87,7 @@ pub fn identify<E: From<IdentifyError>>(
             let mut model = new_model(machine, "identify", &found.inputs);
             found.write_into(&mut model);
             ended(StageEnd::Friction(&found, &model))?;
-            keep(&found.inputs, &found.warnings, DataRole::Fitted);
+            keep(&found.inputs, &found.notes, DataRole::Fitted);
             Some((found, GivenModel::new("friction.toml", model)))
         }
     };
@@ -102,7 +103,7 @@ pub fn identify<E: From<IdentifyError>>(
     let model = dynamics.model(machine, of_friction.map(|given| &given.file));
     let given = GivenModel::new("model.toml", model);
     ended(StageEnd::Dynamics(&dynamics, &given.file))?;
-    keep(&dynamics.inputs, &dynamics.warnings, DataRole::Fitted);
+    keep(&dynamics.inputs, &dynamics.notes, DataRole::Fitted);
     let numbers = given.numbers()?;
     let mut validated = None;
     if !data.held_out.is_empty() {
@@ -110,7 +111,7 @@ pub fn identify<E: From<IdentifyError>>(
         let settings = ValidateSettings::of(&given);
         let found = validate(&unseen, &settings, control, &mut |_, _| {})?;
         ended(StageEnd::Validated(&found))?;
-        keep(&found.inputs, &found.warnings, DataRole::HeldOut);
+        keep(&found.inputs, &found.notes, DataRole::HeldOut);
         validated = Some(found);
     }
     let one_joint = without_rows_of(machine, &data.one_joint, &data.logs);
@@ -139,6 +140,6 @@ pub fn identify<E: From<IdentifyError>>(
         diagnosed,
         refined,
         inputs,
-        warnings,
+        notes,
     })
 }

@@ -3,11 +3,12 @@
 //! A [`Dataset`] is a robot as its file describes it ([`LoggedRobot`]) with its logs by what they are for; a [`Log`] is a
 //! file, arrays in memory or a reduced log. Of a file the rows are parsed once and serve every stage. A [`GivenModel`] is
 //! a model file, a [`Control`] the callbacks for progress and cancellation. Each stage returns its result as plain data,
-//! with warnings as sentences; it writes nothing. `validate`, `torque` and `watch` hand over single rows as they come.
+//! with what it noticed as [`StageNote`]s; it writes nothing. `validate`, `torque` and `watch` hand over single rows as they come.
 //!
 //! | stage | from | to |
 //! |---|---|---|
 //! | [`check_setup()`] | logs | [`CheckedSetup`]: mistakes of the robot file that the torques show |
+//! | [`accepted_setup()`] | logs | [`AcceptedSetup`]: what a fit goes on with, or a [`SetupRefusal`] |
 //! | [`friction()`] | one-joint logs | [`IdentifiedFriction`]: theta 13..32 with covariance |
 //! | [`fit_gains()`] | logs of currents, one with a known payload | [`FittedGains`]: torque per ampere of each joint |
 //! | [`lsq()`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
@@ -22,6 +23,9 @@
 //! | [`identify()`] | logs by what they are for | [`Campaigned`]: all of it, one after the other |
 
 pub use crate::campaign::{Campaigned, IdentifySettings, StageEnd, identify};
+pub use crate::find::accepted_setup::{
+    AcceptedSetup, ContradictedSetup, SetupRefusal, accepted_setup,
+};
 pub use crate::find::check_setup::{CheckedSetup, check_setup};
 pub use crate::find::diagnose::{DataFault, DiagnoseEnd, DiagnoseSettings, Diagnosed, diagnose};
 pub use crate::find::diagnosis::{DiagnosisResult, DiagnosisVerdict, accept_option, signal_words};
@@ -78,6 +82,10 @@ pub use crate::input::reduced::{
 pub use crate::input::repeated::repeated_rows;
 pub use crate::input::track_error::TrackError;
 pub use crate::input::unknowns::FittedUnknown;
+pub use crate::note::{
+    FitNote, FrictionNote, LogNote, ModelNote, NumberWithStd, RowLoss, SetupNote, StageNote,
+    TrackNote,
+};
 pub use crate::watch::{
     RowSource, STREAM, WatchLine, WatchSettings, Watched, WatchedJoint, watch, watch_recipe,
 };

@@ -41,6 +41,7 @@ mod fleet;
 mod held_out;
 pub mod identify;
 mod input;
+mod note;
 pub mod observe;
 pub mod open_loop;
 pub mod replay;

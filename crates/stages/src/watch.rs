@@ -14,12 +14,12 @@ use crate::input::in_use::levers;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::temperatures;
+use crate::note::{ModelNote, StageNote};
 use crate::observe::{
     AlarmDetector, Observer, ObserverRecipe, TorqueAlarm, TorqueExplainer, TorqueExplanation,
     recipe,
 };
 use cft_ident_core::motion::{FilterSettings, ZeroOrderHold};
-use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 use cft_ident_logs::log::{Block, Instant, Provenance, Reader};
@@ -102,7 +102,7 @@ pub struct Watched {
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// Filters of an observer: positions of all joints come through one, as external torques were learnt.
@@ -251,8 +251,8 @@ pub fn watch(
         return Err(error);
     }
     inputs.insert(0, reader.provenance()?);
-    let mut warnings = reader.warnings();
-    warnings.extend(far(excesses, settings.per_hour));
+    let of_reader = reader.warnings().into_iter().map(StageNote::OfReader);
+    let far = far(excesses, settings.per_hour);
     let middle: Vec<f64> = (held.joints.iter())
         .map(|held| 0.5 * (held.positions_seen[0] + held.positions_seen[1]))
         .collect();
@@ -274,7 +274,8 @@ pub fn watch(
         }
     });
     let joints: Vec<WatchedJoint> = joints.collect();
-    warnings.extend(blind(&joints, &held.joints));
+    let of_model = far.into_iter().chain(blind(&joints, &held.joints));
+    let notes = of_reader.chain(of_model.map(StageNote::Model)).collect();
     Ok(Watched {
         point,
         joints,
@@ -291,7 +292,7 @@ pub fn watch(
         ended_by: error.as_ref().map(ToString::to_string),
         error,
         inputs,
-        warnings,
+        notes,
     })
 }
 
@@ -306,26 +307,24 @@ fn json_lines(log: &Log) -> Option<Box<dyn Read + Send>> {
     spec.stream().ok().filter(|_| is_json)
 }
 
-/// The word about joints that cannot be watched.
-fn blind(joints: &[WatchedJoint], held: &[HeldOut]) -> Vec<String> {
+/// The joints that cannot be watched.
+fn blind(joints: &[WatchedJoint], held: &[HeldOut]) -> Vec<ModelNote> {
     let each = joints.iter().zip(held).filter(|(of, _)| of.blind);
-    let shown = each.map(|(of, held)| {
-        let [limit, torque] = [of.threshold[0], held.torque_seen].map(|x| number::significant(x, 3));
-        format!(
-            "cannot watch {}: an alarm takes {limit} {} from outside, and the greatest torque of the joint along the logs of the fit is {torque} {}; a better model (`diagnose`), or more --false-alarms, narrows it",
-            of.joint, of.unit, of.unit
-        )
+    let noted = each.map(|(of, held)| ModelNote::Blind {
+        joint: of.joint.clone(),
+        threshold: of.threshold[0],
+        torque: held.torque_seen,
+        unit: of.unit.clone(),
     });
-    shown.collect()
+    noted.collect()
 }
 
-/// A word on a rate that the calibration is too short for.
-fn far(excesses: &TorqueExcesses, per_hour: f64) -> Option<String> {
+/// A rate that the calibration is too short for.
+fn far(excesses: &TorqueExcesses, per_hour: f64) -> Option<ModelNote> {
     let hours = excesses.observed_s / 3600.0;
-    (hours * per_hour < 1.0).then(|| {
-        format!(
-            "the threshold for {per_hour} false alarms an hour goes beyond what {:.0} s of unloaded motion show ({} excesses): it is extrapolated; more of it makes it surer: longer logs for the fit, or `--unloaded LOG`",
-            excesses.observed_s, excesses.clusters
-        )
+    (hours * per_hour < 1.0).then_some(ModelNote::Extrapolated {
+        per_hour,
+        observed_s: excesses.observed_s,
+        excesses: excesses.clusters,
     })
 }

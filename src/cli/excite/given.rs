@@ -63,7 +63,8 @@ pub(super) fn add(
         &mut |block| log.read(block),
     )
     .map_err(|error| IdentifyError::of_run(&spec.name(), error))?;
-    warnings.extend(log.in_words(&summary));
+    let notes = log.notes_with(&summary);
+    warnings.extend(notes.iter().map(ToString::to_string));
     bench.inputs.push(log.provenance()?);
     given.add_log(&sums, summary.samples as f64);
     Ok(())

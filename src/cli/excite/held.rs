@@ -10,7 +10,7 @@ use super::ExciteRun;
 use crate::cli::{CliError, Outcome};
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::held::{PoseToHold, poses_to_hold};
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident_report::report::table::{CellAlignment, Table};
 
 /// Poses that were chosen.
@@ -87,6 +87,6 @@ pub(super) fn run(bench: &ExciteRun, count: usize, path: &Path) -> Result<Outcom
         joints,
         poses: poses.into_iter().map(of_file).collect(),
     };
-    let document = JsonDocument::new("excite-static", &bench.inputs, &[], &result)?;
+    let document = JsonDocument::new("excite-static", &bench.inputs, &NO_WARNINGS, &result)?;
     Ok(Outcome::new(bench.context.text(text, &brief), document))
 }

@@ -4,7 +4,7 @@ use super::Args;
 use crate::cli::{CliError, Context, Outcome, arguments, file_name, tool::failed};
 use cft_ident_export::export::header::identifier;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident_tool::tool::{ToolFile, c_function};
 
 use super::{ExportedModel, WrittenFile, stem};
@@ -58,7 +58,7 @@ pub(super) fn run(args: &Args, text: &str, context: &Context) -> Result<Outcome,
         beyond: Vec::new(),
         lines,
     };
-    let document = JsonDocument::new("export", &[provenance], &[], &result)?;
+    let document = JsonDocument::new("export", &[provenance], &NO_WARNINGS, &result)?;
     Ok(Outcome::new(out, document))
 }
 

@@ -5,7 +5,7 @@ use clap_complete::Shell;
 use serde_json::json;
 
 use crate::cli::{CliError, CommandLine, Outcome};
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 
 /// Write the completion script of a shell to standard output.
 #[derive(Debug, Clone, clap::Args)]
@@ -25,6 +25,6 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     );
     let text = String::from_utf8_lossy(&script).into_owned();
     let result = json!({"shell": args.shell.to_string(), "script": text});
-    let document = JsonDocument::new("generate", &[], &[], &result)?;
+    let document = JsonDocument::new("generate", &[], &NO_WARNINGS, &result)?;
     Ok(Outcome::new(text, document))
 }

@@ -7,7 +7,7 @@ use clap_mangen::Man;
 use serde_json::json;
 
 use crate::cli::{CliError, CommandLine, Context, Outcome};
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 
 /// Write the manual pages, cft-ident.1 and one for each command, into a folder.
 #[derive(Debug, Clone, clap::Args)]
@@ -50,6 +50,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let result = json!({"files": written});
     Ok(Outcome::new(
         text,
-        JsonDocument::new("generate", &[], &[], &result)?,
+        JsonDocument::new("generate", &[], &NO_WARNINGS, &result)?,
     ))
 }

@@ -11,7 +11,7 @@ use cft_ident_drive::drive::outcome::DriveResult;
 use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
 use cft_ident_plant::excite::MotionJudgements;
 use cft_ident_plant::simulate::truth::TruthFile;
-use cft_ident_report::report::json::{self, JsonDocument};
+use cft_ident_report::report::json::{self, JsonDocument, NO_WARNINGS};
 use cft_ident_stages::identify::{
     ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, Payload,
     TorqueAlong, Tracked, Validated, Watched,
@@ -132,6 +132,6 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let result = serde_json::json!({"kind": name.as_ref().map(|n| n.get_name()), "of": found});
     Ok(Outcome::new(
         text,
-        JsonDocument::new("generate", &[], &[], &result)?,
+        JsonDocument::new("generate", &[], &NO_WARNINGS, &result)?,
     ))
 }

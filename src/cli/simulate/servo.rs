@@ -8,7 +8,7 @@ use cft_ident_logs::output::{LogForm, LogWriter};
 use cft_ident_plant::simulate::servo::{
     BenchMotion, ServoDrive, ServoPlant, ServoRig, ServoRun, run_servo,
 };
-use cft_ident_report::report::json::JsonDocument;
+use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 
 /// The motion of that name.
 pub(super) fn motion(name: &str) -> Result<BenchMotion, String> {
@@ -165,7 +165,7 @@ pub(super) fn run(
     );
     Ok(Outcome::new(
         context.text(text, &format!("written: {}", names.0)),
-        JsonDocument::new("simulate", &[], &[], &result)?,
+        JsonDocument::new("simulate", &[], &NO_WARNINGS, &result)?,
     ))
 }
 

@@ -5,6 +5,8 @@
 //! has no other word for them. Nothing of the moment (clock, duration, threads, absolute path)
 //! belongs in it.
 
+use std::fmt::Display;
+
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
@@ -33,6 +35,9 @@ pub enum JsonError {
     },
 }
 
+/// Of a command that warns of nothing.
+pub const NO_WARNINGS: [&str; 0] = [];
+
 /// A complete document, ready to be printed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JsonDocument {
@@ -44,10 +49,10 @@ impl JsonDocument {
     ///
     /// # Errors
     /// When `result` is no object, repeats a field of the envelope, or cannot be expressed in JSON.
-    pub fn new<T: Serialize>(
+    pub fn new<T: Serialize, W: Display>(
         command: &str,
         inputs: &[Provenance],
-        warnings: &[String],
+        warnings: &[W],
         result: &T,
     ) -> Result<Self, JsonError> {
         let named = || command.to_owned();
@@ -60,6 +65,7 @@ impl JsonDocument {
         fields.insert("version".into(), env!("CARGO_PKG_VERSION").into());
         let inputs = serde_json::to_value(inputs).map_err(failed)?;
         fields.insert("inputs".into(), inputs);
+        let warnings: Vec<String> = warnings.iter().map(W::to_string).collect();
         fields.insert("warnings".into(), warnings.into());
         let found = match serde_json::to_value(result).map_err(failed)? {
             Value::Object(own) => {
@@ -175,7 +181,7 @@ mod tests {
     #[test]
     fn the_envelope_comes_first_and_the_result_follows_in_its_order() {
         let result = json!({"joints": [], "condition": {"raw": 2.5}});
-        let document = JsonDocument::new("lsq", &[input()], &["a gap".into()], &result).unwrap();
+        let document = JsonDocument::new("lsq", &[input()], &["a gap"], &result).unwrap();
         let keys: Vec<_> = document.fields().keys().map(String::as_str).collect();
         assert_eq!(
             keys.join(" "),
@@ -193,7 +199,7 @@ mod tests {
     fn numbers_that_are_not_finite_become_null() {
         let list = [f64::INFINITY, 0.1 + 0.2, f64::NEG_INFINITY, f64::NAN];
         let odd = std::collections::BTreeMap::from([("list", list)]);
-        let document = JsonDocument::new("friction", &[], &[], &odd).unwrap();
+        let document = JsonDocument::new("friction", &[], &NO_WARNINGS, &odd).unwrap();
         let back: Value = serde_json::from_str(&document.text()).unwrap();
         assert_eq!(back["list"], json!([null, 0.30000000000000004, null, null]));
     }
@@ -221,9 +227,9 @@ mod tests {
 
     #[test]
     fn a_result_without_fields_or_with_fields_of_the_envelope_is_refused() {
-        let list = JsonDocument::new("lsq", &[], &[], &json!([1, 2]));
+        let list = JsonDocument::new("lsq", &[], &NO_WARNINGS, &json!([1, 2]));
         assert!(matches!(list, Err(JsonError::NotAnObject { found, .. }) if found == "a list"));
-        let twice = JsonDocument::new("lsq", &[], &[], &json!({"version": 3}));
+        let twice = JsonDocument::new("lsq", &[], &NO_WARNINGS, &json!({"version": 3}));
         assert!(matches!(twice, Err(JsonError::FieldTaken { field, .. }) if field == "version"));
     }
 }

@@ -2,6 +2,8 @@
 //! and a page are two renderings of it ([`super::text`], [`super::page`]); each part says where it is
 //! shown, since a page has room for more.
 
+use std::fmt::Display;
+
 use super::figure::PictureGroup;
 use super::table::{Table, WIDTH};
 use super::traces::FigureTraces;
@@ -271,8 +273,8 @@ impl Writer<'_> {
     }
 
     /// A list of sentences; nothing where there are none.
-    pub fn list<S: AsRef<str>>(&mut self, items: impl IntoIterator<Item = S>) {
-        let items: Vec<String> = items.into_iter().map(|i| i.as_ref().to_owned()).collect();
+    pub fn list<S: Display>(&mut self, items: impl IntoIterator<Item = S>) {
+        let items: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
         if !items.is_empty() {
             self.push(ReportPart::List(items));
         }

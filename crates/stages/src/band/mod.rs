@@ -17,7 +17,6 @@ pub(crate) use directions::{Direction, Directions};
 pub(crate) use folds::{Folds, FreeColumns, without_each};
 pub(crate) use quantiles::{Error, held_out, quantile};
 
-use cft_ident_core::number;
 pub use cft_ident_core::robot::deviation::{Deviation, NORMAL_95};
 use cft_ident_core::robot::model::Model;
 use cft_ident_files::config::ModelFile;
@@ -53,8 +52,19 @@ impl<'a> Band<'a> {
     }
 }
 
-/// How to get a band where the model file has none.
-pub(crate) const NO_BAND: &str = "the model file holds no [[held_out]], so that it is not known how far its torques are off: no band; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside for that";
+/// A joint that leaves what its model was fitted on: what it takes up, then what was seen, where that is less.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BeyondSeen {
+    pub joint: String,
+    /// Share of the samples.
+    pub share: f64,
+    /// Greatest speeds \[m/s or rad/s\].
+    pub speed: Option<[f64; 2]>,
+    /// Greatest torques \[N or Nm\].
+    pub torque: Option<[f64; 2]>,
+    /// Ends of the ranges of positions \[m or rad\].
+    pub positions: Option<[[f64; 2]; 2]>,
+}
 
 /// Ranges that a motion takes up, beside those that a model was fitted and tried in.
 pub struct Reach<'a> {
@@ -98,39 +108,22 @@ impl<'a> Reach<'a> {
         }
     }
 
-    /// What was left, joint by joint, in sentences.
-    pub fn in_words(&self) -> Vec<String> {
-        let mut out = Vec::new();
-        for (j, held) in self.held.iter().enumerate() {
-            if self.beyond[j] == 0 {
-                continue;
-            }
+    /// The joints that leave what was seen of them.
+    pub fn beyond(&self) -> Vec<BeyondSeen> {
+        let more = |x: f64, seen: f64| (x > (1.0 + BEYOND_SEEN_SHARE) * seen).then_some([x, seen]);
+        let of = |(j, held): (usize, &HeldOut)| {
             let [speed, torque, low, high] = self.seen[j];
-            let mut parts = Vec::new();
-            let mut more = |what: &str, x: f64, seen: f64| {
-                if x > (1.0 + BEYOND_SEEN_SHARE) * seen {
-                    let [x, seen] = [x, seen].map(|x| number::significant(x, 3));
-                    parts.push(format!("{what} up to {x}, where {seen} was seen"));
-                }
-            };
-            more("speeds", speed, held.speed_seen);
-            more("torques", torque, held.torque_seen);
             let [from, to] = held.positions_seen;
             let room = BEYOND_SEEN_SHARE * (to - from);
-            if low < from - room || high > to + room {
-                let ends = [low, high, from, to].map(|x| number::significant(x, 3));
-                let [low, high, from, to] = ends;
-                parts.push(format!(
-                    "positions {low}..{high}, where {from}..{to} was seen"
-                ));
-            }
-            let share = number::percent(self.beyond[j] as f64 / self.samples as f64);
-            out.push(format!(
-                "{} leaves what the model was fitted on in {share} of the samples, where its band is a guess: {}",
-                held.joint,
-                parts.join("; ")
-            ));
-        }
-        out
+            let outside = low < from - room || high > to + room;
+            (self.beyond[j] > 0).then(|| BeyondSeen {
+                joint: held.joint.clone(),
+                share: self.beyond[j] as f64 / self.samples as f64,
+                speed: more(speed, held.speed_seen),
+                torque: more(torque, held.torque_seen),
+                positions: outside.then_some([[low, high], [from, to]]),
+            })
+        };
+        self.held.iter().enumerate().filter_map(of).collect()
     }
 }

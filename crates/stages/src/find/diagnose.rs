@@ -11,7 +11,7 @@ use crate::fit::contact::contacts;
 use crate::fit::known_friction::before_these;
 use crate::fit::own_fit::{OwnFit, OwnRefit};
 use crate::fit::prior::{information, moved_alone, open};
-use crate::held_out::hold_out::{Held, hold_out, or_warning};
+use crate::held_out::hold_out::{Held, hold_out, or_note};
 use crate::held_out::open_loop::spoiled;
 use crate::input::control::{Control, Progress};
 use crate::input::dataset::{Dataset, GivenModel};
@@ -23,6 +23,7 @@ use crate::input::model::{own_laws, refined};
 use crate::input::position_cutoff::known;
 use crate::input::repeated::each_row_once;
 use crate::input::temperatures;
+use crate::note::StageNote;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
@@ -68,8 +69,8 @@ pub struct Diagnosed {
     pub in_memory: InMemory,
     /// Names of the logs, in order: fitted, holdout.
     pub logs: Vec<String>,
-    /// Stretches in which something may push the robot, one sentence each.
-    pub contacts: Vec<String>,
+    /// Stretches in which something may push the robot, one note each.
+    pub contacts: Vec<StageNote>,
     /// The given model as torques are computed with it.
     pub given: AugmentedModel,
     /// The declared numbers as they would be written, without the effects; none where the given model stays.
@@ -174,7 +175,7 @@ pub fn diagnose(
     let machine = &together;
     let mut in_memory = read_each(machine, &each, &all, control)?;
     let contact = contacts(machine, &data.logs, control)?;
-    in_memory.warnings.splice(0..0, contact.iter().cloned());
+    in_memory.notes.splice(0..0, contact.iter().cloned());
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
         &settings.candidates,
@@ -297,14 +298,14 @@ pub fn diagnose(
                 (&data.logs, &found.in_memory.inputs),
                 control,
             );
-            found.held = or_warning(tried, &mut found.in_memory.warnings)?;
+            found.held = or_note(tried, &mut found.in_memory.notes)?;
         }
         None => {}
     }
     let _work = control.begin("free run", None);
     found.free_run = found.run_freely(machine, (name, as_given))?;
     let spoiled = found.free_run.as_ref().and_then(spoiled);
-    found.in_memory.warnings.extend(spoiled);
+    found.in_memory.notes.extend(spoiled);
     Ok(DiagnoseEnd::Diagnosed(Box::new(found)))
 }
 

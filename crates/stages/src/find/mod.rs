@@ -1,5 +1,6 @@
 //! What is wrong with a robot file, and what its model lacks.
 
+pub(crate) mod accepted_setup;
 pub(crate) mod check_setup;
 pub(crate) mod diagnose;
 pub(crate) mod diagnosis;

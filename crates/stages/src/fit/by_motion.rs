@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::dynamics::IdentifiedDynamics;
 use super::motion_fit::MotionFit;
-use crate::held_out::hold_out::{hold_out, or_warning};
+use crate::held_out::hold_out::{hold_out, or_note};
 use crate::held_out::residual::JointResidual;
 use crate::held_out::validate::{ValidateSettings, validate};
 use crate::input::control::Control;
@@ -16,6 +16,7 @@ use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::{in_file, refined};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
+use crate::note::{FitNote, StageNote};
 use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
 use cft_ident_core::effect::{AugmentedModel, ModelEffect};
 use cft_ident_core::inertia::verdict::verdict;
@@ -74,10 +75,7 @@ pub(crate) fn by_motion(
     let taken = fit.after.blocks < fit.before.blocks;
     found.by_motion = Some(motion_fit(machine, &fit, (window.is_some(), taken)));
     if !taken {
-        found.warnings.push(
-            "fit to the motion: on blocks set aside it runs no better than least squares of torques, which stands in the model"
-                .to_owned(),
-        );
+        found.notes.push(StageNote::Fit(FitNote::MotionNoBetter));
         return Ok(());
     }
     take(found, &fit);
@@ -99,7 +97,7 @@ pub(crate) fn by_motion(
     let file = found.model(machine, None);
     let smoothed = machine.smoothed_as(&found.position_cutoffs);
     let held = hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control);
-    found.held = or_warning(held, &mut found.warnings)?;
+    found.held = or_note(held, &mut found.notes)?;
     Ok(())
 }
 
@@ -127,18 +125,16 @@ fn take(found: &mut IdentifiedDynamics, fit: &AxisFit) {
     let u = found.unknowns.len();
     found.covariance = fit.covariance.view((0, 0), (u, u)).into_owned();
     if fit.apart < MIN_WINDOWS_PER_NUMBER * fit.free.len() as f64 {
-        found.warnings.push(format!(
-            "fit to the motion: the logs hold {:.0} windows of {} s behind one another for {} numbers; their standard deviations are rough; give longer logs",
-            fit.apart,
-            fit.window_s,
-            fit.free.len()
-        ));
+        found.notes.push(StageNote::Fit(FitNote::FewWindows {
+            windows: fit.apart,
+            window_s: fit.window_s,
+            numbers: fit.free.len(),
+        }));
     }
     if fit.ending == IterationEnding::IterationLimit {
-        found.warnings.push(format!(
-            "fit to the motion: did not settle in {} steps; its last result stands",
-            fit.steps
-        ));
+        let steps = fit.steps;
+        let note = FitNote::MotionNotSettled { steps };
+        found.notes.push(StageNote::Fit(note));
     }
 }
 

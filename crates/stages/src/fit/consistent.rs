@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::estimate::InertialEstimate;
 use crate::input::error::IdentifyError;
 use crate::input::logged_robot::LoggedRobot;
+use crate::note::{FitNote, StageNote};
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::inertia::feasible::{
     ConsistencyProblem, FeasibleParameters, FrictionColumns, PRIOR_WEIGHT, feasible,
@@ -16,7 +17,6 @@ use cft_ident_core::inertia::left_out::{FitsOnLeftOut, TrialLeftOut, left_out};
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
 use cft_ident_core::math::covariance::information_rows;
 use cft_ident_core::math::descent::IterationEnding;
-use cft_ident_core::number;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::bodies::StandardMap;
 use cft_ident_core::robot::standard::{Body, STANDARD, pseudo_inertia};
@@ -221,66 +221,42 @@ pub(crate) fn consistent(
     })
 }
 
-/// What was found; where the search failed or left the finite the plain fit stands alone, and a warning says so.
+/// What was found; where the search failed or left the finite the plain fit stands alone, and a note says so.
 pub(crate) fn or_plain_fit(
     found: Result<ConsistentLinks, IdentifyError>,
-    warnings: &mut Vec<String>,
+    notes: &mut Vec<StageNote>,
 ) -> Option<ConsistentLinks> {
     let finite = |of: &ConsistentLinks| of.values.iter().chain(&of.growth).all(|x| x.is_finite());
     let found = found.ok().filter(finite);
     if found.is_none() {
-        warnings.push(
-            "the search for physically consistent parameters did not converge: the file holds the plain fit only, and simulators may refuse it"
-                .to_owned(),
-        );
+        notes.push(StageNote::Fit(FitNote::NotConsistent));
     }
     found
 }
 
 impl ConsistentLinks {
-    /// What did not come as it should, as warnings.
-    pub(crate) fn warnings(&self) -> Vec<String> {
-        let mut out = Vec::new();
-        if !self.impossible_priors.is_empty() {
-            out.push(format!(
-                "the `inertial` of {} in the robot file is that of no body that can exist (a negative mass or moment, or a moment above the sum of the other two): a plain body stands for it where the torques say nothing",
-                self.impossible_priors.join(", ")
-            ));
-        }
-        if self.status == IterationEnding::IterationLimit {
-            out.push(format!(
-                "the search for physically consistent links ended before its optimum: the duality gap is {} of the sum of squares",
-                number::percent(self.duality_gap)
-            ));
-        }
-        out.extend(self.worse_on_left_out());
-        out
+    /// What did not come as it should.
+    pub(crate) fn notes(&self) -> Vec<FitNote> {
+        let impossible = (!self.impossible_priors.is_empty()).then(|| FitNote::ImpossibleBodies {
+            links: self.impossible_priors.clone(),
+        });
+        let ended = self.status == IterationEnding::IterationLimit;
+        let ended = ended.then_some(FitNote::DualityGap {
+            gap: self.duality_gap,
+        });
+        let notes = [impossible, ended, self.worse_on_left_out()];
+        notes.into_iter().flatten().collect()
     }
 
     /// Joints whose torque physically consistent parameters fit worse by more than chance: a finding about the machine.
-    fn worse_on_left_out(&self) -> Option<String> {
-        let worse: Vec<String> = self
-            .left_out
-            .iter()
-            .filter(|of| of.worse)
-            .map(|of| {
-                let [consistent, plain] = [of.consistent, of.unconstrained].map(number::percent);
-                format!("{} {consistent} (unconstrained {plain})", of.joint)
-            })
-            .collect();
-        let then = match self.in_use {
-            _ if worse.is_empty() => return None,
-            true => {
-                "the model computes with the physically consistent parameters; --unconstrained writes the plain fit alone"
-            }
-            false => {
-                "the model computes with the plain fit, which is better on other logs too; files of links are exported from the physically consistent parameters"
-            }
-        };
-        Some(format!(
-            "no physically consistent parameters fit these torques as well as unconstrained ones, on blocks left out of both fits: {}. The gain of a torque channel is wrong, the robot file lacks a body or a drive, or what is logged is no torque of the joint; {then}",
-            worse.join(", ")
-        ))
+    fn worse_on_left_out(&self) -> Option<FitNote> {
+        let worse = self.left_out.iter().filter(|of| of.worse);
+        let errors = |of: &LeftOutResidual| [of.consistent, of.unconstrained];
+        let joints: Vec<_> = worse.map(|of| (of.joint.clone(), errors(of))).collect();
+        (!joints.is_empty()).then_some(FitNote::ConsistentWorse {
+            joints,
+            in_use: self.in_use,
+        })
     }
 
     /// Writes the parameters beside those of a model whose first ones are the unknowns of the fit.

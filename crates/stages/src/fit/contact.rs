@@ -6,11 +6,11 @@ use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::unknowns::{FittedUnknown, columns};
+use crate::note::{FitNote, NumberWithStd, StageNote};
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::jumps::ResidualJump;
 use cft_ident_core::inertia::solve::{RowWeighting, fit};
-use cft_ident_core::number;
 use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::{RowFault, escape};
 
@@ -19,12 +19,12 @@ const MOVED_DEVIATIONS: f64 = 4.0;
 /// Room on both sides of a stretch that is to be left out \[s\]: the filters carry it so far.
 const ROOM_S: f64 = 0.1;
 
-/// Stretches of these logs in which something pushes the robot, one sentence each.
+/// Stretches of these logs in which something pushes the robot, one note each.
 pub(crate) fn contacts(
     machine: &LoggedRobot,
     logs: &[Log],
     control: &Control,
-) -> Result<Vec<String>, IdentifyError> {
+) -> Result<Vec<StageNote>, IdentifyError> {
     let linear = machine.file.friction_law() != FrictionLawKind::DoubleTanh;
     if !linear || machine.robot.joints() < 2 || logs.iter().any(|log| log.reduced().is_some()) {
         return Ok(Vec::new());
@@ -36,39 +36,29 @@ pub(crate) fn contacts(
 }
 
 impl LogPasses<'_> {
-    /// The stretches that the first reading found, one sentence each.
-    pub(crate) fn contacts(&self) -> Result<Vec<String>, IdentifyError> {
-        let shown = |(log, jump): &(usize, ResidualJump)| {
+    /// The stretches that the first reading found, one note each.
+    pub(crate) fn contacts(&self) -> Result<Vec<StageNote>, IdentifyError> {
+        let noted = |(log, jump): &(usize, ResidualJump)| {
             let log = &self.logs[*log];
             let first = self.machine.first_row(log, self.control)?;
-            Ok(sentence(self.machine, log, jump, first))
+            Ok(StageNote::Fit(contact(self.machine, log, jump, first)))
         };
-        self.jumps.iter().map(shown).collect()
+        self.jumps.iter().map(noted).collect()
     }
 }
 
 /// `first` is the time of the first row that is read, as the rows have it [s].
-fn sentence(machine: &LoggedRobot, log: &Log, jump: &ResidualJump, first: f64) -> String {
+fn contact(machine: &LoggedRobot, log: &Log, jump: &ResidualJump, first: f64) -> FitNote {
     let [from, to] = jump.span.map(|t| t - first);
     let names = machine.robot.joint_names();
-    let joints: Vec<&str> = jump
-        .joints
-        .iter()
-        .map(|(j, _)| names[*j].as_str())
-        .collect();
-    let most = jump
-        .joints
-        .iter()
-        .map(|(_, ratio)| *ratio)
-        .fold(0.0, f64::max);
-    format!(
-        "{}: the residual of {} is up to {} times the usual from {from:.2} to {to:.2} s after its first row: contact? `--leave-out {:.2}..{:.2}s` fits without it",
-        escape(&log.name()),
-        joints.join(", "),
-        number::significant(most, 2),
-        (from - ROOM_S).max(0.0),
-        to + ROOM_S
-    )
+    let joints = jump.joints.iter();
+    FitNote::Contact {
+        log: escape(&log.name()),
+        joints: joints.clone().map(|(j, _)| names[*j].clone()).collect(),
+        ratio: joints.map(|(_, ratio)| *ratio).fold(0.0, f64::max),
+        span: [from, to],
+        leave_out: [(from - ROOM_S).max(0.0), to + ROOM_S],
+    }
 }
 
 /// What a fit says with the rows that were bridged as they were logged, where that is another thing.
@@ -78,7 +68,7 @@ pub(crate) fn hangs_on_bridged(
     (linear, rows): (&RegressorColumns, &BlockFactors),
     unknowns: &[FittedUnknown],
     control: &Control,
-) -> Result<Option<String>, IdentifyError> {
+) -> Result<Option<FitNote>, IdentifyError> {
     if !machine.bridges(logs, control)? {
         return Ok(None);
     }
@@ -102,26 +92,13 @@ pub(crate) fn hangs_on_bridged(
         let both = std(&now).hypot(std(&other));
         let known = now.determined[i] && other.determined[i];
         (known && (a - b).abs() > MOVED_DEVIATIONS * both).then(|| {
-            let value = |x: f64, std: f64| {
-                format!(
-                    "{} +- {}",
-                    number::significant(x, 4),
-                    number::significant(std, 2)
-                )
-            };
-            format!(
-                "{} {} with and {} without",
-                unknown.key,
-                value(*a, std(&now)),
-                value(*b, std(&other))
-            )
+            let [a, b] = [(a, &now), (b, &other)].map(|(value, fit)| NumberWithStd {
+                value: *value,
+                std: std(fit),
+            });
+            (unknown.key.clone(), [a, b])
         })
     });
-    let moved: Vec<String> = moved.collect();
-    Ok((!moved.is_empty()).then(|| {
-        format!(
-            "this fit hangs on the rows that are bridged as spikes: {} that bridge; where they are peaks of a motion, `keep = [\"spike\"]` in [log] of the robot file leaves them as they are",
-            moved.join(", ")
-        )
-    }))
+    let moved: Vec<_> = moved.collect();
+    Ok((!moved.is_empty()).then_some(FitNote::HangsOnBridged { moved }))
 }

@@ -16,6 +16,7 @@ use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::new_model;
 use crate::input::position_cutoff::PositionCutoff;
 use crate::input::unknowns::FittedUnknown;
+use crate::note::StageNote;
 use crate::setup::Finding;
 use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::solution::ConditionNumbers;
@@ -84,7 +85,7 @@ pub struct IdentifiedDynamics {
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// The unknowns that the data are really about.

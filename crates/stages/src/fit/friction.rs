@@ -14,8 +14,9 @@ use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::new_model;
 use crate::input::one_joint::{self, OneJointLog};
 use crate::input::repeated::each_row_once;
+use crate::note::{FrictionNote, StageNote};
 use crate::setup::Finding;
-use cft_ident_core::friction::estimate::{FrictionOptions, JointEstimate, NisStatistic, estimate};
+use cft_ident_core::friction::estimate::{FrictionOptions, JointEstimate, estimate};
 use cft_ident_core::friction::excitation::{FrictionError, moving_joint};
 use cft_ident_core::friction::inputs::FrictionInputs;
 use cft_ident_core::friction::passes::GivenNoise;
@@ -46,7 +47,7 @@ pub struct IdentifiedFriction {
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// Friction of one joint.
@@ -150,8 +151,8 @@ pub fn friction(
     let (machine, logs) = (&data.machine, data.logs.as_slice());
     machine.check_gains()?;
     each_row_once(machine, &[("fit", logs)])?;
-    let (groups, inputs, found) = by_joint(machine, logs, settings, control)?;
-    let mut warnings = [machine.file.notes.0.clone(), found].concat();
+    let (groups, inputs, of_logs) = by_joint(machine, logs, settings, control)?;
+    let mut notes: Vec<StageNote> = StageNote::of_robot(&machine.file).chain(of_logs).collect();
     let work = control.begin("friction filter", Some(groups.len() as u64));
     let parameters = machine.robot.parameters().iter();
     let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();
@@ -167,17 +168,17 @@ pub fn friction(
         .collect();
     let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
     control.check()?;
-    warnings.extend(joints.iter().flat_map(joint_warnings));
+    notes.extend(joints.iter().flat_map(joint_notes));
     Ok(IdentifiedFriction {
         joints,
         setup: Vec::new(),
         inputs,
-        warnings,
+        notes,
     })
 }
 
-/// Logs by the joint that they move, with their inputs and warnings.
-type LogsByJoint = (BTreeMap<usize, JointLogs>, Vec<Provenance>, Vec<String>);
+/// Logs by the joint that they move, with their inputs and what was noticed of them.
+type LogsByJoint = (BTreeMap<usize, JointLogs>, Vec<Provenance>, Vec<StageNote>);
 
 fn by_joint(
     machine: &LoggedRobot,
@@ -197,17 +198,17 @@ fn by_joint(
     let _work = control.begin("reading logs", None);
     let ranges = machine.ranges();
     let mut groups: BTreeMap<usize, JointLogs> = BTreeMap::new();
-    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
+    let (mut inputs, mut notes) = (Vec::new(), Vec::new());
     for log in logs {
         let OneJointLog {
             motions,
             narrower,
             zero_order_hold,
             provenance,
-            warnings: found,
+            notes: of_log,
         } = one_joint::read(machine, log, control)?;
         inputs.push(provenance.clone());
-        warnings.extend(found);
+        notes.extend(of_log);
         let moving = match named {
             Some(j) => j,
             None => {
@@ -224,7 +225,7 @@ fn by_joint(
         group.logs.push(log.name());
         group.inputs.push(provenance);
     }
-    Ok((groups, inputs, warnings))
+    Ok((groups, inputs, notes))
 }
 
 /// Logs of one joint.
@@ -299,103 +300,54 @@ fn start_of(machine: &LoggedRobot, joint: &str) -> Option<DoubleTanh> {
 }
 
 /// What a reader of the estimate should know.
-fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
-    let (joint, e) = (&found.joint, &found.estimate);
+fn joint_notes(found: &FrictionOfJoint) -> impl Iterator<Item = StageNote> {
+    let e = &found.estimate;
     let mut out = Vec::new();
     if e.ending != IterationEnding::Converged {
-        out.push(format!(
-            "{joint}: the search ended without converging ({}): none of its parameters is identified",
-            match e.ending {
-                IterationEnding::IterationLimit => "at the limit of iterations",
-                _ => "it diverged",
-            }
-        ));
+        out.push(FrictionNote::NotConverged(e.ending));
     }
-    if let Some(speed) = e.drives_at() {
-        out.push(format!(
-            "{joint}: at a speed of {} the friction law drives the joint, which no friction does: do not use it there",
-            number::significant(speed, 2)
-        ));
-    }
-    let NisStatistic {
-        mean,
-        lower_95,
-        upper_95,
-        ..
-    } = e.nis;
-    if mean > upper_95 {
-        out.push(format!(
-            "{joint}: mean NIS {mean:.2} is above its bounds {lower_95:.2}..{upper_95:.2}: the innovations are alike for many samples, so something acts that the model lacks"
-        ));
-    } else if mean < lower_95 {
-        out.push(format!(
-            "{joint}: mean NIS {mean:.2} is below its bounds {lower_95:.2}..{upper_95:.2}: innovations cancel over many samples, as where positions are finer than the encoder's step^2/12 or were filtered before they were logged"
-        ));
+    out.extend(e.drives_at().map(|speed| FrictionNote::Drives { speed }));
+    let (mean, bounds) = (e.nis.mean, [e.nis.lower_95, e.nis.upper_95]);
+    if mean > bounds[1] {
+        out.push(FrictionNote::NisAbove { mean, bounds });
+    } else if mean < bounds[0] {
+        out.push(FrictionNote::NisBelow { mean, bounds });
     }
     if e.widening > 1.5 {
-        out.push(format!(
-            "{joint}: the innovations are coloured, so the model lacks something; the standard deviations hold a factor {:.1} for it",
-            e.widening.sqrt()
-        ));
+        let factor = e.widening.sqrt();
+        out.push(FrictionNote::Coloured { factor });
     }
     if e.coulomb_terms == 1 {
-        out.push(format!(
-            "{joint}: one Coulomb term does; coulomb_2 and slope_2 are not determined, for a second term makes \
-             these data no likelier"
-        ));
+        out.push(FrictionNote::OneCoulombTerm);
     } else if e.cancels() {
-        out.push(format!(
-            "{joint}: coulomb_1 {} and coulomb_2 {} cancel, for their slopes are hardly apart: use the friction \
-             curve, which is known to {}, and none of the two by itself",
-            number::significant(e.law.coulomb_1, 3),
-            number::significant(e.law.coulomb_2, 3),
-            number::percent(e.curve_uncertainty()),
-        ));
+        out.push(FrictionNote::TermsCancel {
+            coulomb: [e.law.coulomb_1, e.law.coulomb_2],
+            uncertainty: e.curve_uncertainty(),
+        });
     }
-    out.extend(missed_plateaus(found));
+    // the mean torque at constant speed took no part in the fit
+    let missed = e.missed_plateaus();
+    if !missed.is_empty() {
+        out.push(FrictionNote::MissedPlateaus(missed));
+    }
     let settled = e.ending == IterationEnding::Converged;
     for (k, value) in e.values.iter().enumerate() {
+        let parameter = DoubleTanh::NAMES[k];
         match value.verdict {
-            Verdict::LowerBound => out.push(format!(
-                "{joint}: {} is only known to be above {} (95 %): these data do not pass slowly enough through zero speed to bound it from above",
-                DoubleTanh::NAMES[k],
-                number::significant(value.value, 3)
-            )),
-            Verdict::NotIdentifiable if settled && !e.one_term_lacks(k) => out.push(format!(
-                "{joint}: these data cannot determine {}; log slower reversals and more speeds",
-                DoubleTanh::NAMES[k]
-            )),
+            Verdict::LowerBound => out.push(FrictionNote::LowerBound {
+                parameter,
+                above: value.value,
+            }),
+            Verdict::NotIdentifiable if settled && !e.one_term_lacks(k) => {
+                out.push(FrictionNote::NotDetermined { parameter });
+            }
             Verdict::NotIdentifiable | Verdict::Identified | Verdict::Weak => {}
         }
     }
-    out
-}
-
-/// The speeds at which the mean torque at constant speed, which took no part in the fit, contradicts the curve.
-fn missed_plateaus(found: &FrictionOfJoint) -> Option<String> {
-    const NAMED: usize = 4;
-    let missed = found.estimate.missed_plateaus();
-    let worst = missed.iter().take(NAMED).map(|m| {
-        format!(
-            "{} at {} (curve {})",
-            number::significant(m.torque, 3),
-            number::significant(m.v, 2),
-            number::significant(m.curve, 3)
-        )
-    });
-    let worst: Vec<String> = worst.collect();
-    let more = match missed.len().saturating_sub(NAMED) {
-        0 => String::new(),
-        n => format!(" and {n} more speeds"),
-    };
-    (!missed.is_empty()).then(|| {
-        format!(
-            "{}: the friction curve misses the mean torque at constant speed: {}{more}; do not use it at these \
-             speeds: the law cannot follow this joint there, its friction depends on more than speed, or it \
-             changed between the logs",
-            found.joint,
-            worst.join(", ")
-        )
+    let joint = found.joint.clone();
+    out.into_iter().map(move |note| StageNote::Friction {
+        joint: joint.clone(),
+        note,
     })
 }
 

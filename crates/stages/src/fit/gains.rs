@@ -13,6 +13,7 @@ use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::setup_file::differences;
 use crate::input::unknowns::columns;
+use crate::note::{FitNote, StageNote};
 use crate::setup::{ChannelKind, Finding, FindingKind, Setting};
 use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::gains::{self, GainFit, GainRows, PayloadColumns};
@@ -59,7 +60,7 @@ pub struct CurrentGains {
     pub(crate) covariance: DMatrix<f64>,
     /// The log with the payload.
     pub inputs: Vec<Provenance>,
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// The gains, and the robot with them.
@@ -138,10 +139,10 @@ pub fn fit_gains(
     Ok(FittedGains {
         gains: CurrentGains {
             joints: joints.map(gain).collect(),
-            warnings: warnings(
+            notes: notes(
                 &fit,
                 reference.as_deref(),
-                std::mem::take(&mut reading.loaded.warnings),
+                std::mem::take(&mut reading.loaded.notes),
             ),
             reference,
             covariance: relative,
@@ -390,17 +391,14 @@ pub(crate) fn findings(machine: &LoggedRobot) -> Vec<Finding> {
     found.iter().map(finding).collect()
 }
 
-fn warnings(fit: &GainFit, reference: Option<&str>, mut of_logs: Vec<String>) -> Vec<String> {
-    if let Some(reference) = reference {
-        of_logs.push(format!(
-            "gains are ratios to that of {reference}: the model is in the unit of its channel, and a known payload (`--fit-gains LOG:mass=KG`) would make it SI"
-        ));
-    }
-    if fit.ending != cft_ident_core::math::descent::IterationEnding::Converged {
-        of_logs.push(format!(
-            "the gains did not settle in {} steps; their last values stand",
-            fit.iterations
-        ));
-    }
+fn notes(fit: &GainFit, reference: Option<&str>, mut of_logs: Vec<StageNote>) -> Vec<StageNote> {
+    let ratios = reference.map(|reference| FitNote::GainRatios {
+        reference: reference.to_owned(),
+    });
+    let ended = fit.ending != cft_ident_core::math::descent::IterationEnding::Converged;
+    let ended = ended.then_some(FitNote::GainsNotSettled {
+        steps: fit.iterations,
+    });
+    of_logs.extend(ratios.into_iter().chain(ended).map(StageNote::Fit));
     of_logs
 }

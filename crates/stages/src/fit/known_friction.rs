@@ -9,10 +9,10 @@ use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
+use crate::note::{FrictionNote, StageNote};
 use cft_ident_core::friction::estimate::curve_std;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::solve::Fit;
-use cft_ident_core::number;
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_core::verdict::{Verdict, WEAK, verdict_of};
 use cft_ident_files::config::ModelFile;
@@ -169,7 +169,7 @@ impl FrictionBefore {
         joints.map(of).collect()
     }
 
-    /// Joints that move faster here than in their one-joint logs, as warnings with what it costs; `fastest` is the
+    /// Joints that move faster here than in their one-joint logs, with what it costs; `fastest` is the
     /// greatest speed of each joint.
     pub fn beyond(
         &self,
@@ -177,7 +177,7 @@ impl FrictionBefore {
         columns: &RegressorColumns,
         all: &DMatrix<f64>,
         fastest: &[f64],
-    ) -> Vec<String> {
+    ) -> Vec<StageNote> {
         let first = all.nrows() - GRADIENT * self.known.len();
         let mut out = Vec::new();
         for (j, joint) in machine.robot.joint_names().iter().enumerate() {
@@ -193,17 +193,15 @@ impl FrictionBefore {
             let covariance = of_joint(all, first + GRADIENT * j);
             let (torque, std) = (law.torque(speed), curve_std(&law, &covariance, speed));
             let position = machine.robot.joint_kind(j).position_unit();
-            let shown = |x: f64| number::significant(x, 3);
-            let described = match 2.0 * std > WEAK * torque.abs() {
-                true => "cannot be told from these logs",
-                // its deviation is that of the law, which nobody has seen there
-                false => "is continued by its law",
-            };
-            out.push(format!(
-                "{joint}: moves at up to {} {position}/s, but its one-joint logs at up to {}; its friction beyond {described}: log the joint alone as fast as it is used",
-                shown(speed),
-                shown(covered[1]),
-            ));
+            out.push(StageNote::Friction {
+                joint: joint.clone(),
+                note: FrictionNote::FasterThanLogged {
+                    speed,
+                    logged: covered[1],
+                    unit: position,
+                    uncertain: 2.0 * std > WEAK * torque.abs(),
+                },
+            });
         }
         out
     }

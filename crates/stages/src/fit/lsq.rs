@@ -8,9 +8,9 @@ use super::estimate::{FitRows, InertialEstimate, estimate};
 use super::gains::CurrentGains;
 use super::geometry::geometry;
 use super::known_friction::FrictionBefore;
-use super::lsq_warnings::{confounded, negative, rests, with_friction};
+use super::lsq_notes::{confounded, negative, rests};
 use super::weakest::weakest;
-use crate::held_out::hold_out::{Held, hold_out, or_warning};
+use crate::held_out::hold_out::{Held, hold_out, or_note};
 use crate::held_out::open_loop::is_in_si;
 use crate::held_out::residual::{JointResidual, RelativeError};
 use crate::held_out::validate::errors_on_fitted;
@@ -26,6 +26,7 @@ use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::{MadeWith, ReducedLog};
 use crate::input::repeated::each_row_once;
 use crate::input::unknowns::{FittedUnknown, columns, unknowns};
+use crate::note::{FitNote, StageNote};
 use cft_ident_core::inertia::accumulate::RelativeResidual;
 use cft_ident_core::inertia::encoder::correct;
 use cft_ident_core::inertia::essential::{EssentialParameters, essential};
@@ -123,7 +124,7 @@ pub fn lsq(
         true => {
             let fastest = machine.fastest(logs, control)?;
             let found = consistent(machine, &estimated, &fastest);
-            or_plain_fit(found, &mut passes.warnings)
+            or_plain_fit(found, &mut passes.notes)
         }
         false => None,
     };
@@ -145,17 +146,21 @@ pub fn lsq(
     covariance
         .view_mut((0, 0), (u, u))
         .copy_from(&fit.covariance);
-    let mut warnings = machine.file.notes.0.clone();
-    warnings.extend(settings.gains.iter().flat_map(|g| g.warnings.clone()));
-    warnings.extend(consistent.iter().flat_map(ConsistentLinks::warnings));
-    if friction.is_none() {
-        warnings.push(with_friction(law).to_owned());
-    }
-    warnings.extend(account.warnings());
-    warnings.extend(held_by_parts(settings, &reduced));
-    warnings.append(&mut passes.warnings);
-    warnings.splice(0..0, passes.contacts()?);
-    warnings.extend(rests(machine, &resting));
+    let mut notes = passes.contacts()?;
+    notes.extend(StageNote::of_robot(&machine.file));
+    notes.extend(settings.gains.iter().flat_map(|g| g.notes.clone()));
+    let of_fit = consistent.iter().flat_map(ConsistentLinks::notes);
+    let of_fit = of_fit
+        .chain(
+            friction
+                .is_none()
+                .then_some(FitNote::FrictionFitted { law }),
+        )
+        .chain(account.notes())
+        .chain(held_by_parts(settings, &reduced));
+    notes.extend(of_fit.map(StageNote::Fit));
+    notes.append(&mut passes.notes);
+    notes.extend(rests(machine, &resting).map(StageNote::Fit));
     let mut friction_of_fit = Vec::new();
     let mut friction_prior = Vec::new();
     if let (Some(before), Some((_, file))) = (&before, friction) {
@@ -164,7 +169,7 @@ pub fn lsq(
         if estimator != EstimatorKind::Oe {
             friction_of_fit = before.after(machine, &columns, &covariance);
             let fastest = machine.fastest(logs, control)?;
-            warnings.extend(before.beyond(machine, &columns, &covariance, &fastest));
+            notes.extend(before.beyond(machine, &columns, &covariance, &fastest));
         }
     }
     let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
@@ -174,13 +179,14 @@ pub fn lsq(
     let plain = matches!(estimator, EstimatorKind::Ols | EstimatorKind::Wls) && !law;
     if plain && before.is_none() && reduced.is_empty() {
         let rows = (&linear, &sums);
-        warnings.extend(hangs_on_bridged(machine, logs, rows, &unknowns, control)?);
+        let hangs = hangs_on_bridged(machine, logs, rows, &unknowns, control)?;
+        notes.extend(hangs.map(StageNote::Fit));
     }
-    warnings.extend(confounded(&fit, &unknowns));
-    warnings.extend(negative(&unknowns));
+    let doubts = confounded(&fit, &unknowns).into_iter();
+    notes.extend(doubts.chain(negative(&unknowns)).map(StageNote::Fit));
     let costs: Vec<&CutoffCosts> = costs.iter().collect();
     let (position_cutoffs, wrong) = CutoffCosts::described(&costs, machine, &columns, &fit);
-    warnings.extend(wrong);
+    notes.extend(wrong);
     if unknowns
         .iter()
         .all(|u| u.verdict == Verdict::NotIdentifiable)
@@ -198,10 +204,8 @@ pub fn lsq(
         return Err(IdentifyError::OnlyNoise { left: least });
     }
     let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
-    let shown = of_geometry.iter().map(|finding| &finding.meaning);
-    warnings.extend(
-        shown.map(|shown| format!("{shown}; take the plain number unless it was measured so")),
-    );
+    let found = of_geometry.iter().cloned().map(Box::new);
+    notes.extend(found.map(FitNote::Geometry).map(StageNote::Fit));
     let plain_error: Vec<f64> = fit.relative_error.iter().map(left).collect();
     let mut found = IdentifiedDynamics {
         held: Held::default(),
@@ -232,7 +236,7 @@ pub fn lsq(
         unknowns,
         summary,
         inputs,
-        warnings,
+        notes,
         setup: of_geometry,
     };
     // every figure is that of the numbers that are written
@@ -244,7 +248,7 @@ pub fn lsq(
         let smoothed = machine.smoothed_as(&found.position_cutoffs);
         let tried = refined(&file, &machine.name)
             .and_then(|model| hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control));
-        found.held = or_warning(tried, &mut found.warnings)?;
+        found.held = or_note(tried, &mut found.notes)?;
     }
     if let Some(window) = settings.open_loop {
         by_motion(machine, &mut found, logs, window, control)?;
@@ -252,17 +256,14 @@ pub fn lsq(
     Ok(found)
 }
 
-/// Friction that could move with the rows of logs stays where reduced ones have it: a warning.
-fn held_by_parts(settings: &LsqSettings, reduced: &[&ReducedLog]) -> Option<String> {
+/// Friction that could move with the rows of logs stays where reduced ones have it.
+fn held_by_parts(settings: &LsqSettings, reduced: &[&ReducedLog]) -> Option<FitNote> {
     let part = reduced.first()?;
     let moved = settings.friction.is_some()
         && !settings.hold_friction
         && settings.estimator == EstimatorKind::Wls;
-    moved.then(|| {
-        format!(
-            "the friction stays as it was given to `reduce`, as by --hold-friction: {} is a reduced log, and its rows hold no other; give logs to refine it",
-            part.name()
-        )
+    moved.then(|| FitNote::FrictionOfReduced {
+        log: part.name().to_owned(),
     })
 }
 

@@ -10,7 +10,7 @@ pub(crate) mod gains;
 pub(crate) mod geometry;
 pub(crate) mod known_friction;
 pub(crate) mod lsq;
-pub(crate) mod lsq_warnings;
+pub(crate) mod lsq_notes;
 pub(crate) mod motion_fit;
 pub(crate) mod own_fit;
 pub(crate) mod payload;

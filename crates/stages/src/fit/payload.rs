@@ -17,6 +17,7 @@ use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::{InMemory, read_whole};
 use crate::input::logged_robot::LoggedRobot;
+use crate::note::{ModelNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::bandwidth;
 use cft_ident_core::inertia::feasible::{ConsistencyProblem, feasible};
@@ -25,7 +26,6 @@ use cft_ident_core::math::long_run::long_run;
 use cft_ident_core::math::rank::svd;
 use cft_ident_core::math::rfactor::RFactor;
 use cft_ident_core::motion::{ParallelFilters, Stretch, rest};
-use cft_ident_core::number;
 use cft_ident_core::robot::bodies::StandardMap;
 use cft_ident_core::robot::friction::sign;
 use cft_ident_core::robot::standard::{Body, STANDARD};
@@ -89,12 +89,11 @@ pub fn payload(
     let readings = readings.into_iter().collect::<Result<Vec<_>, _>>()?;
     drop(work);
     control.check()?;
-    let mut warnings = whole.warnings;
+    let mut notes = whole.notes;
     if declared {
-        warnings.push(format!(
-            "the torques are currents times the gains of the robot file: the intervals of the body hold {} for those; `lsq --fit-gains LOG:mass=KG` with a weighed load makes the gains this robot's own",
-            number::percent(NORMAL_95 * GAIN_DEVIATION)
-        ));
+        notes.push(StageNote::Model(ModelNote::DeclaredGains {
+            interval: NORMAL_95 * GAIN_DEVIATION,
+        }));
     }
     let links = robot.tree().links();
     Ok(Payload {
@@ -103,7 +102,7 @@ pub fn payload(
         readings,
         samples: rows.joints.iter().map(|rows| rows.len() as u64).sum(),
         inputs: whole.inputs,
-        warnings,
+        notes,
     })
 }
 

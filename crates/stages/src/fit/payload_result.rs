@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::note::StageNote;
 use cft_ident_core::robot::standard::{Body, STANDARD};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
@@ -87,7 +88,7 @@ pub struct Payload {
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 impl IntervalNumber {

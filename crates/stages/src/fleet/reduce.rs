@@ -12,6 +12,7 @@ use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::reduced::{MadeWith, ReducedLog, ReducedLogs, ReducedRows};
 use crate::input::repeated::each_row_once;
 use crate::input::unknowns::columns;
+use crate::note::StageNote;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::robot_file::FrictionLawKind;
@@ -85,7 +86,10 @@ pub fn reduce(
         let reduced = ReducedLog {
             made_with: made_with.clone(),
             bounds_s,
-            warnings: passes.warnings,
+            // as it is read back
+            notes: (passes.notes.iter())
+                .map(|note| StageNote::OfReducedLog(note.to_string()))
+                .collect(),
             summary,
             own,
             fastest,

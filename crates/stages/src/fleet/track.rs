@@ -12,6 +12,7 @@ use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::reduced::reduced_log::MadeWith;
 use crate::input::track_error::TrackError;
+use crate::note::{StageNote, TrackNote};
 use cft_ident_fleet::track::{
     ChangeKind, LogEstimate, ParameterChange, ParameterCourse, ParameterLevel, apart,
     follow_together,
@@ -41,7 +42,7 @@ pub struct Tracked {
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// One robot over its logs.
@@ -123,19 +124,22 @@ pub fn track(robots: &[RobotSources], control: &Control) -> Result<Tracked, Iden
         return Err(TrackError::Empty.into());
     }
     let work = control.begin("tracking", Some(robots.len() as u64));
-    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
+    let (mut inputs, mut notes) = (Vec::new(), Vec::new());
     let mut all = Vec::new();
     for robot in robots {
-        let (sources, times) = ordered(robot, &mut warnings)?;
+        let mut noticed = Vec::new();
+        let (sources, times) = ordered(robot, &mut noticed)?;
         inputs.extend(sources.iter().map(|s| s.provenance().clone()));
         all.push(followed(&robot.name, &sources, &times, control)?);
         if sources.len() == 1 {
-            warnings.push(format!(
-                "{}: one log, {}: there is no course to follow",
-                robot.name,
-                sources[0].name()
-            ));
+            noticed.push(TrackNote::OneLog {
+                log: sources[0].name().to_owned(),
+            });
         }
+        notes.extend(noticed.into_iter().map(|note| StageNote::Track {
+            robot: robot.name.clone(),
+            note,
+        }));
         work.advance(1);
     }
     let fleet = compared(&all);
@@ -143,14 +147,14 @@ pub fn track(robots: &[RobotSources], control: &Control) -> Result<Tracked, Iden
         robots: all,
         fleet,
         inputs,
-        warnings,
+        notes,
     })
 }
 
 /// Sources in order of time, and their times.
 fn ordered(
     robot: &RobotSources,
-    warnings: &mut Vec<String>,
+    notes: &mut Vec<TrackNote>,
 ) -> Result<(Vec<TrackSource>, Vec<f64>), TrackError> {
     let name = || robot.name.clone();
     let given = &robot.sources;
@@ -164,16 +168,10 @@ fn ordered(
     one_robot(robot)?;
     let mut places: Vec<usize> = (0..given.len()).collect();
     let bounds: Option<Vec<[f64; 2]>> = given.iter().map(TrackSource::bounds).collect();
-    let numbered = |warnings: &mut Vec<String>, why: &str| {
-        warnings.push(format!(
-            "{}: {why}: they are taken in the order in which they are given, and their numbers stand for times",
-            robot.name
-        ));
-        (0..given.len()).map(|k| k as f64).collect()
-    };
+    let numbers = || (0..given.len()).map(|k| k as f64).collect();
     let Some(bounds) = bounds else {
-        let times = numbered(warnings, "models have no time of their own");
-        return Ok((given.clone(), times));
+        notes.push(TrackNote::NoTimes);
+        return Ok((given.clone(), numbers()));
     };
     places.sort_by(|a, b| bounds[*a][0].total_cmp(&bounds[*b][0]));
     let overlap = places
@@ -193,8 +191,8 @@ fn ordered(
                 second: given[pair[1]].name().to_owned(),
             });
         }
-        let times = numbered(warnings, "the clocks of these logs overlap");
-        return Ok((given.clone(), times));
+        notes.push(TrackNote::ClocksOverlap);
+        return Ok((given.clone(), numbers()));
     }
     if places.windows(2).any(|p| p[0] > p[1]) {
         let separate = given.iter().enumerate().all(|(k, s)| match s {
@@ -202,14 +200,11 @@ fn ordered(
             TrackSource::Model { .. } => true,
         });
         if separate {
-            warnings.push(format!(
-                "{}: the logs are given out of order; they are followed in order of their clocks",
-                robot.name
-            ));
+            notes.push(TrackNote::OutOfOrder);
         }
     }
     let times: Vec<f64> = places.iter().map(|k| bounds[*k][0]).collect();
-    warnings.extend(jump(robot, &places, &times));
+    notes.extend(jump(robot, &places, &times));
     Ok((places.iter().map(|k| given[*k].clone()).collect(), times))
 }
 
@@ -227,20 +222,19 @@ fn twice(given: &[TrackSource]) -> Option<[&TrackSource; 2]> {
     None
 }
 
-/// A time between two logs that is no time between two logs, as a warning.
-fn jump(robot: &RobotSources, places: &[usize], times: &[f64]) -> Option<String> {
+/// A time between two logs that is no time between two logs.
+fn jump(robot: &RobotSources, places: &[usize], times: &[f64]) -> Option<TrackNote> {
     let mut steps: Vec<f64> = times.windows(2).map(|p| p[1] - p[0]).collect();
     let far = steps.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
     let (at, far) = far.map(|(at, far)| (at, *far))?;
     steps.sort_by(f64::total_cmp);
     let usual = steps[steps.len() / 2];
     (steps.len() > 2 && usual > 0.0 && far > CLOCK_JUMP_STEPS * usual).then(|| {
-        format!(
-            "{}: the clock jumps by {far:.0} s between {} and {}, {CLOCK_JUMP_STEPS} times the usual time between logs or more; if it was set there, give numbers of seconds that run on",
-            robot.name,
-            robot.sources[places[at]].name(),
-            robot.sources[places[at + 1]].name()
-        )
+        TrackNote::ClockJump {
+            by_s: far,
+            between: [at, at + 1].map(|k| robot.sources[places[k]].name().to_owned()),
+            steps: CLOCK_JUMP_STEPS,
+        }
     })
 }
 

@@ -14,6 +14,7 @@ use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::refined_or_friction;
 use crate::input::position_cutoff::known;
 use crate::input::repeated::repeated_rows;
+use crate::note::{ModelNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::friction::estimate::FrictionCurvePoint;
 use cft_ident_core::motion::ParallelFilters;
@@ -49,7 +50,7 @@ pub struct Compared {
     pub curves: Vec<FrictionCurves>,
     /// None where no log is given.
     pub tried: Option<TriedOnLogs>,
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// Friction of one joint by both models.
@@ -195,7 +196,7 @@ fn one_robot([a, b]: [&ComparedFile; 2]) -> Result<(), IdentifyError> {
 }
 
 /// What a reader has to know before believing a difference.
-fn cautions([a, b]: [&ComparedFile; 2], logs: bool) -> Vec<String> {
+fn cautions([a, b]: [&ComparedFile; 2], logs: bool) -> Vec<ModelNote> {
     let mut out = Vec::new();
     let (first, second) = (&a.given.file, &b.given.file);
     let made = |file: &ModelFile| file.provenance.inputs.clone();
@@ -206,22 +207,16 @@ fn cautions([a, b]: [&ComparedFile; 2], logs: bool) -> Vec<String> {
         .map(|i| escape(&i.name))
         .collect();
     if !shared.is_empty() {
-        out.push(format!(
-            "both models are made from {}: their errors are not independent, so differences in \
-             standard deviations are a hint and no test",
-            shared.join(", ")
-        ));
+        out.push(ModelNote::SharedLogs { logs: shared });
     }
     if logs && first.robot.robot.setup != second.robot.robot.setup {
-        out.push("the models are of different set-ups; the logs are read as the first says".into());
+        out.push(ModelNote::OtherSetup);
     }
     if logs && first.robot.log != second.robot.log {
-        out.push("the models map logs differently; the logs are read as the first says".into());
+        out.push(ModelNote::OtherMapping);
     }
     if logs && first.robot.filter != second.robot.filter {
-        out.push(
-            "the models declare different filters; both are judged with that of the first".into(),
-        );
+        out.push(ModelNote::OtherFilter);
     }
     out
 }
@@ -239,14 +234,15 @@ pub fn compare(
     one_robot(sides.each_ref())?;
     let first = &sides[0].given;
     let machine = first.machine();
-    let mut warnings = cautions(sides.each_ref(), !logs.is_empty());
-    warnings.extend(repeated_rows(logs, Some(&machine.file.layout())));
+    let cautions = cautions(sides.each_ref(), !logs.is_empty()).into_iter();
+    let mut notes: Vec<StageNote> = cautions.map(StageNote::Model).collect();
+    notes.extend(repeated_rows(logs, Some(&machine.file.layout())));
     let tried = match logs {
         [] => None,
         logs => Some(on_logs(&machine, &sides, logs, control)?),
     };
     if let Some(tried) = &tried {
-        warnings.extend(tried.in_memory.warnings.iter().cloned());
+        notes.extend(tried.in_memory.notes.iter().cloned());
     }
     Ok(Compared {
         table: compare::side_by_side(&sides[0].given.file, &sides[1].given.file),
@@ -254,7 +250,7 @@ pub fn compare(
         machine,
         sides,
         tried,
-        warnings,
+        notes,
     })
 }
 

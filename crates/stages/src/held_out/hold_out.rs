@@ -7,6 +7,7 @@ use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
+use crate::note::{FitNote, StageNote};
 use crate::observe::{KEPT, Observer, QuietSample, QuietTorques};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{FilterSettings, MotionError, ParallelFilters, Stretch, stretches};
@@ -406,17 +407,16 @@ impl Watched {
     }
 }
 
-/// A word where a model goes without: interruption is passed on.
-pub(crate) fn or_warning(
+/// A note where a model goes without: interruption is passed on.
+pub(crate) fn or_note(
     held: Result<Held, IdentifyError>,
-    warnings: &mut Vec<String>,
+    notes: &mut Vec<StageNote>,
 ) -> Result<Held, IdentifyError> {
     match held {
         Err(IdentifyError::Interrupted) => Err(IdentifyError::Interrupted),
         Err(error) => {
-            warnings.push(format!(
-                "no block of these logs could be set aside, so that the model has no prediction band and no alarms: {error}"
-            ));
+            let error = error.to_string();
+            notes.push(StageNote::Fit(FitNote::NothingSetAside { error }));
             Ok(Held::default())
         }
         Ok(held) => Ok(held),

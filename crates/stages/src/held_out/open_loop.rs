@@ -7,10 +7,10 @@ use crate::input::in_memory::read_each;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
+use crate::note::{ModelNote, StageNote};
 use crate::open_loop::{self, FreeRun, OpenLoop, RunSpan, WindowLength, along};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{FilterSettings, Stretch};
-use cft_ident_core::number;
 use cft_ident_logs::log::Provenance;
 
 /// Length of the windows of robots that have more than one axis \[s\].
@@ -75,24 +75,16 @@ pub(crate) fn whole(stretches: &[Stretch]) -> Vec<RunSpan> {
     each.map(|(s, stretch)| (s, 0, stretch.len())).collect()
 }
 
-/// What a free run says against the model after, as a warning.
-pub(crate) fn spoiled(found: &FreeRun) -> Option<String> {
+/// What a free run says against the model after.
+pub(crate) fn spoiled(found: &FreeRun) -> Option<StageNote> {
     let worse = found.worse().filter_map(|joint| {
         let after = joint.after.as_ref()?;
-        Some(format!(
-            "{} from {} to {} {}",
-            joint.joint,
-            number::significant(joint.given.rms, 3),
-            number::significant(after.rms, 3),
-            joint.unit
-        ))
+        let rms = [joint.given.rms, after.rms];
+        Some((joint.joint.clone(), rms, joint.unit))
     });
-    let worse: Vec<String> = worse.collect();
-    (!worse.is_empty()).then(|| {
-        format!(
-            "free run: driven by the measured torques, the refined model leaves the measured positions faster than the model given (rms in windows of {} s: {}); take it for feed-forward and the given one to simulate",
-            number::significant(found.window_s, 2),
-            worse.join(", ")
-        )
-    })
+    let joints: Vec<_> = worse.collect();
+    (!joints.is_empty()).then_some(StageNote::Model(ModelNote::FreeRunWorse {
+        window_s: found.window_s,
+        joints,
+    }))
 }

@@ -3,13 +3,14 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::band::{Band, Deviation, NO_BAND, Reach};
+use crate::band::{Band, Deviation, Reach};
 use crate::input::control::Control;
 use crate::input::dataset::GivenModel;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
+use crate::note::StageNote;
 use cft_ident_core::motion::{self, FilterSettings, Summary};
 use cft_ident_core::robot::model::Model;
 use cft_ident_files::config::ModelFile;
@@ -40,7 +41,7 @@ pub struct JointAlong {
 pub struct FeedForward {
     pub along: TorqueAlong,
     pub inputs: Vec<Provenance>,
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// Torques along a log of positions by a model. `row` gets
@@ -129,11 +130,8 @@ pub fn torque(
     };
     drop(work);
     control.check()?;
-    let mut warnings = open.in_words(&summary);
-    match &reach {
-        Some(reach) => warnings.extend(reach.in_words()),
-        None => warnings.push(NO_BAND.to_owned()),
-    }
+    let mut notes = open.notes_with(&summary);
+    notes.extend(StageNote::of_reach(reach.as_ref()));
     let inputs = vec![open.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let names = machine.robot.joint_names().iter().enumerate();
@@ -150,7 +148,7 @@ pub fn torque(
             processing: summary,
         },
         inputs,
-        warnings,
+        notes,
     })
 }
 

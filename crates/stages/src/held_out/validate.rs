@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::open_loop::{free_run, open_loop};
-use crate::band::{Band, NO_BAND, Reach};
+use crate::band::{Band, Reach};
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
@@ -18,6 +18,7 @@ use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::ReducedLog;
 use crate::input::repeated::repeated_rows;
 use crate::input::unknowns::columns;
+use crate::note::{ModelNote, StageNote};
 use crate::open_loop::{FreeRun, OpenLoop};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::columns::JointTerm;
@@ -46,7 +47,7 @@ pub struct Validated {
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// Errors on logs that had no part in the model, and on those that it was made from.
@@ -139,10 +140,10 @@ pub fn validate(
     if let Some(window) = settings.open_loop {
         let simulated = open_loop(&data.machine, refined, logs, window, control)?;
         if simulated.astray > 0 {
-            found.warnings.push(format!(
-                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit again without --unconstrained",
-                simulated.astray, simulated.windows
-            ));
+            found.notes.push(StageNote::Model(ModelNote::Astray {
+                astray: simulated.astray,
+                windows: simulated.windows,
+            }));
         }
         found.open_loop = Some(simulated);
     }
@@ -221,29 +222,28 @@ fn errors_of(
         return Err(other);
     }
     if let Some(error) = beyond.impossible(found.judged(), &machine, logs) {
-        found.warnings.insert(0, error.to_string());
+        let error = error.to_string();
+        let note = StageNote::Model(ModelNote::ImpossibleTorque { error });
+        found.notes.insert(0, note);
     }
-    if let Some(text) = not_a_validation(found.judged()) {
-        found.warnings.insert(0, text);
+    if let Some(note) = not_a_validation(found.judged()) {
+        found.notes.insert(0, note);
     }
-    match &reach {
-        Some(reach) => found.warnings.extend(reach.in_words()),
-        None if rows => found.warnings.push(NO_BAND.to_owned()),
-        None => {}
+    if rows {
+        found.notes.extend(StageNote::of_reach(reach.as_ref()));
     }
     Ok(found)
 }
 
-/// The word about errors as large as the torque, where a joint moves.
-pub fn not_a_validation(errors: &TorqueErrors) -> Option<String> {
+/// The note about errors as large as the torque, where a joint moves.
+pub fn not_a_validation(errors: &TorqueErrors) -> Option<StageNote> {
     let moving = |e: &&JointError| e.relative_error_moving.is_some_and(|error| error > 1.0);
     let worst = errors.joints.iter().filter(moving);
     let worst = worst.max_by(|a, b| a.headline().total_cmp(&b.headline()))?;
-    Some(format!(
-        "this is no validation of {}, whose torque is off by {} of itself: a log of another robot, unit, sign or order of joints, or a joint whose torque the model does not have (`cft-ident inspect` with the robot file looks for the former, `diagnose` for the latter)",
-        worst.joint,
-        number::percent(worst.headline())
-    ))
+    Some(StageNote::Model(ModelNote::NoValidation {
+        joint: worst.joint.clone(),
+        error: worst.headline(),
+    }))
 }
 
 /// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
@@ -299,13 +299,13 @@ fn reconstruct(
     let speeds = machine.rest_speeds(&not_reduced(logs), control)?;
     let mut all = TorqueReconstruction::new(&refined.model, &speeds, widths);
     let (mut inputs, mut last) = (Vec::new(), None);
-    let mut warnings = repeated_rows(logs, Some(&machine.file.layout()));
+    let mut notes = repeated_rows(logs, Some(&machine.file.layout()));
     let settings = machine.settings();
     let mut segments = 0;
     for log in logs {
         if let Some(part) = log.reduced() {
             add_reduced(&mut all, machine, refined, part)?;
-            warnings.extend(part.warnings.iter().cloned());
+            notes.extend(part.notes.iter().cloned());
             inputs.push(part.provenance.clone());
             last = Some(part.summary.clone());
             all.end_log();
@@ -321,7 +321,7 @@ fn reconstruct(
                     row(r, origin)
                 })
                 .map_err(|e| open.ended(e))?;
-            warnings.extend(open.in_words(&summary));
+            notes.extend(open.notes_with(&summary));
             inputs.push(open.provenance()?);
             last = Some(summary);
         } else {
@@ -337,7 +337,7 @@ fn reconstruct(
                     .map_err(|e| IdentifyError::motion(&log.name(), e))?;
                 segments += 1;
             }
-            warnings.extend(whole.warnings);
+            notes.extend(whole.notes);
             inputs.extend(whole.inputs);
             last = Some(whole.summary);
         }
@@ -345,10 +345,9 @@ fn reconstruct(
         work.advance(1);
     }
     if let Some(part) = logs.iter().find_map(Log::reduced) {
-        warnings.push(format!(
-            "{} is a reduced log: the errors of single rows (the largest, R2, those before the filter) are not known of it",
-            part.name()
-        ));
+        notes.push(StageNote::Model(ModelNote::ErrorsOfReduced {
+            log: part.name().to_owned(),
+        }));
     }
     let summary = last.ok_or(IdentifyError::NoLog)?;
     let used = used_for(file, &inputs);
@@ -369,7 +368,7 @@ fn reconstruct(
         free_run: None,
         validation: all.finish(summary),
         inputs,
-        warnings,
+        notes,
     };
     found.every().for_each(|errors| machine.name_units(errors));
     Ok(found)

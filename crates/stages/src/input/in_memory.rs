@@ -4,6 +4,7 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use crate::note::StageNote;
 use cft_ident_core::motion::{FilterSettings, Stretch, Summary, stretches};
 use cft_ident_logs::log::{Instant, Provenance};
 
@@ -14,7 +15,7 @@ const MOST_SAMPLES: usize = 9_000_000;
 pub struct InMemory {
     pub stretches: Vec<Stretch>,
     pub inputs: Vec<Provenance>,
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
     pub summary: Summary,
     /// Instant from which the times of the first log are counted.
     pub origin: Instant,
@@ -50,7 +51,7 @@ pub(crate) fn read_each(
 ) -> Result<InMemory, IdentifyError> {
     let n = machine.robot.joints();
     let work = control.begin("reading", Some(logs.len() as u64));
-    let (mut all, mut inputs, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut all, mut inputs, mut notes) = (Vec::new(), Vec::new(), Vec::new());
     let mut last: Option<Summary> = None;
     let mut origin = None;
     let mut samples = 0;
@@ -74,8 +75,8 @@ pub(crate) fn read_each(
                 most: MOST_SAMPLES,
             });
         }
-        warnings.extend(open.in_words(&summary));
-        warnings.extend(machine.put_temperatures(log, open.origin(), &mut found)?);
+        notes.extend(open.notes_with(&summary));
+        notes.extend(machine.put_temperatures(log, open.origin(), &mut found)?);
         inputs.push(open.provenance()?);
         all.extend(found);
         last = Some(summary);
@@ -87,7 +88,7 @@ pub(crate) fn read_each(
     Ok(InMemory {
         stretches: all,
         inputs,
-        warnings,
+        notes,
         summary,
         origin,
         averaged,

@@ -4,6 +4,7 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
+use crate::note::StageNote;
 use cft_ident_core::friction::motions::motions;
 use cft_ident_core::friction::prepare::SmoothedMotion;
 use cft_ident_core::motion::{DifferenceFormula, FilterSettings};
@@ -24,7 +25,7 @@ pub struct OneJointLog {
     pub zero_order_hold: bool,
     pub provenance: Provenance,
     /// What the reader left out, dropped or chose.
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
 }
 
 /// Smoothing of the motion that the friction filter takes as known.
@@ -82,7 +83,7 @@ pub fn read(
         motions: smooth(&declared)?,
         narrower: smooth(&narrower)?,
         zero_order_hold,
-        warnings: open.warnings(),
+        notes: open.notes(),
         provenance: open.provenance()?,
     })
 }

@@ -6,8 +6,8 @@ use super::control::Control;
 use super::error::{IdentifyError, ReadError};
 use super::first_look::FirstLook;
 use super::held_torque::HeldTorque;
+use crate::note::{LogNote, RowLoss, StageNote};
 use cft_ident_core::motion::{MotionError, RunError, Stretch, Summary, ZeroOrderHold};
-use cft_ident_core::number::{self, clock};
 use cft_ident_core::robot::Robot;
 use cft_ident_logs::inspect::RowCutter;
 use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader};
@@ -72,26 +72,31 @@ impl OpenLog<'_> {
 
     /// What was left out, mended or chosen, once the last block is read: how many rows each cause costs,
     /// the most first, then what and where.
-    pub fn warnings(&self) -> Vec<String> {
+    pub fn notes(&self) -> Vec<StageNote> {
         self.costs_and_places(0)
     }
 
     /// The same with what the processing left out.
-    pub fn in_words(&self, summary: &Summary) -> Vec<String> {
+    pub fn notes_with(&self, summary: &Summary) -> Vec<StageNote> {
         let mut out = self.costs_and_places(summary.skipped.samples);
-        out.extend(self.velocities());
-        out.extend(summary_warnings(&self.name, self.origin(), summary));
+        let processing = of_summary(&self.name, self.origin(), summary);
+        out.extend(
+            self.velocities()
+                .into_iter()
+                .chain(processing)
+                .map(StageNote::Log),
+        );
         out
     }
 
-    /// Velocity columns that are no derivatives of the positions, as a warning: by one factor where it is the clock.
-    fn velocities(&self) -> Option<String> {
+    /// Velocity columns that are no derivatives of the positions: by one factor where it is the clock.
+    fn velocities(&self) -> Option<LogNote> {
         let names = &self.layout().joints;
         let off = |(j, factor): (usize, &Option<f64>)| {
             let factor = factor.filter(|x| (x - 1.0).abs() > VELOCITY_SCALE_TOLERANCE)?;
-            Some((names.get(j)?.as_str(), factor))
+            Some((names.get(j)?.clone(), factor))
         };
-        let off: Vec<(&str, f64)> = self
+        let off: Vec<(String, f64)> = self
             .look
             .velocities
             .iter()
@@ -100,67 +105,47 @@ impl OpenLog<'_> {
             .collect();
         let known = self.look.velocities.iter().flatten().count();
         let (first, others) = off.split_first()?;
-        let alike = |(_, x): &(&str, f64)| (x / first.1 - 1.0).abs() < VELOCITY_SCALE_TOLERANCE;
-        let each: Vec<String> = off
-            .iter()
-            .map(|(j, x)| format!("{j} {}", number::significant(*x, 3)))
-            .collect();
-        let cause = match off.len() == known && known > 1 && others.iter().all(alike) {
-            true => format!(
-                "all by one factor: the clock of the log runs at {} of its rate (`time_unit` in [log], or the rate), or the unit of the velocities is another",
-                number::significant(first.1.recip(), 3)
-            ),
-            false => {
-                "its unit, sign or gear, or its joint, is another; give it in [log.joint.NAME]"
-                    .to_owned()
-            }
-        };
-        Some(format!(
-            "{}: velocity columns are so many times the derivative of the positions: {}; {cause}",
-            self.name,
-            each.join(", ")
-        ))
+        let alike = |(_, x): &(String, f64)| (x / first.1 - 1.0).abs() < VELOCITY_SCALE_TOLERANCE;
+        Some(LogNote::VelocityScale {
+            log: self.name.clone(),
+            alike: off.len() == known && known > 1 && others.iter().all(alike),
+            joints: off,
+        })
     }
 
-    fn costs_and_places(&self, too_short: u64) -> Vec<String> {
-        let mut out: Vec<String> = self.costs(too_short).into_iter().collect();
-        out.extend(self.reader.warnings());
-        let found = self.look.gate.warnings().into_iter();
-        out.extend(found.map(|text| format!("{}: {text}", self.name)));
-        out
+    fn costs_and_places(&self, too_short: u64) -> Vec<StageNote> {
+        let lost = self.rows_lost(too_short).map(StageNote::Log);
+        let of_reader = self.reader.warnings().into_iter().map(StageNote::OfReader);
+        let marked = self.look.gate.warnings().into_iter().map(|sentence| {
+            StageNote::Log(LogNote::Marked {
+                log: self.name.clone(),
+                sentence,
+            })
+        });
+        lost.into_iter().chain(of_reader).chain(marked).collect()
     }
 
     /// How many rows each cause costs, the most first; `None` where none is left out or mended.
-    fn costs(&self, too_short: u64) -> Option<String> {
+    fn rows_lost(&self, too_short: u64) -> Option<LogNote> {
         let by_reader = self.reader.left_out();
-        let mut costs: Vec<(u64, String)> = (self.look.gate.costs().iter())
-            .map(|cost| (cost.rows, cost.text()))
-            .chain(by_reader.map(|(rows, kind)| (rows, format!("{rows} {kind}"))))
-            .chain([(
-                too_short,
-                format!("{too_short} in stretches too short to filter"),
-            )])
-            .filter(|(rows, _)| *rows > 0)
+        let mut losses: Vec<RowLoss> = (self.look.gate.costs().iter())
+            .map(|cost| RowLoss::Marked(*cost))
+            .chain(by_reader.map(|(rows, kind)| RowLoss::Dropped(rows, kind)))
+            .chain([RowLoss::TooShort(too_short)])
+            .filter(|loss| loss.rows() > 0)
             .collect();
-        costs.sort_by_key(|(rows, _)| std::cmp::Reverse(*rows));
-        if costs.is_empty() {
+        losses.sort_by_key(|loss| std::cmp::Reverse(loss.rows()));
+        if losses.is_empty() {
             return None;
         }
         let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
         let dropped = dropped + self.reader.not_read();
-        let rows = self.reader.samples() + dropped;
-        let shown = match self.cutter.removed() + dropped + too_short {
-            0 => format!("none of {rows} rows is left out in all"),
-            removed => format!(
-                "{removed} of {rows} rows are left out in all, those next to bad ones included"
-            ),
-        };
-        let causes: Vec<String> = costs.into_iter().map(|(_, text)| text).collect();
-        Some(format!(
-            "{}: {shown}: {}; see `cft-ident inspect`",
-            self.name,
-            causes.join(", ")
-        ))
+        Some(LogNote::RowsLost {
+            log: self.name.clone(),
+            rows: self.reader.samples() + dropped,
+            left_out: self.cutter.removed() + dropped + too_short,
+            losses,
+        })
     }
 
     /// What ended a run through it, with what was left out where too little remained.
@@ -170,7 +155,10 @@ impl OpenLog<'_> {
             RunError::Motion(error) => IdentifyError::Motion {
                 of: self.name.clone(),
                 left_out: matches!(error, MotionError::NoSegment { .. })
-                    .then(|| self.costs(0).or_else(|| self.reader.warnings().pop()))
+                    .then(|| {
+                        let lost = self.rows_lost(0).map(|lost| lost.to_string());
+                        lost.or_else(|| self.reader.warnings().pop())
+                    })
                     .flatten()
                     .map(String::into_boxed_str),
                 error,
@@ -192,39 +180,25 @@ impl OpenLog<'_> {
     }
 }
 
-/// Warnings about what the processing left out of a log.
-fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<String> {
-    let zero = origin.seconds();
-    let mut out = Vec::new();
-    if summary.skipped.segments > 0 {
-        let spans: Vec<String> = summary
-            .skipped
-            .spans_s
-            .iter()
-            .take(3)
-            .map(|[a, b]| format!("{}..{} s", clock(zero + a), clock(zero + b)))
-            .collect();
-        out.push(format!(
-            "{name}: {} between gaps, too short to filter, left out ({} samples; {})",
-            match summary.skipped.segments {
-                1 => "1 stretch".to_owned(),
-                many => format!("{many} stretches"),
-            },
-            summary.skipped.samples,
-            spans.join(", ")
-        ));
-    }
-    if summary.segments > 1 {
-        out.push(format!(
-            "{name}: gaps part it into {} stretches; nothing is differentiated across them",
-            summary.segments
-        ));
-    }
-    if summary.interpolated > 0 {
-        out.push(format!(
-            "{name}: the clock is uneven; its {} samples were resampled to an even one, with {} points interpolated",
-            summary.samples, summary.interpolated
-        ));
-    }
-    out
+/// What the processing left out of a log.
+fn of_summary(name: &str, origin: Instant, summary: &Summary) -> Vec<LogNote> {
+    let (zero, log) = (origin.seconds(), || name.to_owned());
+    let skipped = &summary.skipped;
+    let spans = skipped.spans_s.iter();
+    let too_short = (skipped.segments > 0).then(|| LogNote::TooShort {
+        log: log(),
+        stretches: skipped.segments,
+        samples: skipped.samples,
+        spans: spans.map(|span| span.map(|t| zero + t)).collect(),
+    });
+    let gaps = (summary.segments > 1).then(|| LogNote::Gaps {
+        log: log(),
+        stretches: summary.segments,
+    });
+    let uneven = (summary.interpolated > 0).then(|| LogNote::UnevenClock {
+        log: log(),
+        samples: summary.samples,
+        interpolated: summary.interpolated,
+    });
+    [too_short, gaps, uneven].into_iter().flatten().collect()
 }

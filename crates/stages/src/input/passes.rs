@@ -9,6 +9,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
 use super::own_settings::{JointCost, OwnSettings};
+use crate::note::StageNote;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::accumulate_weighted;
 use cft_ident_core::inertia::closed_loop::LoopGains;
@@ -52,7 +53,7 @@ pub struct LogPasses<'a> {
     pub(crate) control: &'a Control,
     pub(crate) work: ControlledWork,
     pub inputs: Vec<Provenance>,
-    pub warnings: Vec<String>,
+    pub notes: Vec<StageNote>,
     /// Stretches in which something pushes the robot, by the places of the logs, by the first reading.
     pub(crate) jumps: Vec<(usize, ResidualJump)>,
     /// Of the first log, by the first reading.
@@ -77,7 +78,7 @@ impl<'a> LogPasses<'a> {
             control,
             work: control.begin("least squares", None),
             inputs: Vec::new(),
-            warnings: Vec::new(),
+            notes: Vec::new(),
             jumps: Vec::new(),
             summary: None,
             steps: Vec::new(),
@@ -197,7 +198,7 @@ impl<'a> LogPasses<'a> {
                     PositionFilter::Narrower => part.narrower_rows(columns)?,
                 });
                 if first {
-                    self.warnings.extend(part.warnings.iter().cloned());
+                    self.notes.extend(part.notes.iter().cloned());
                     self.saw(part.provenance.clone(), part.summary.clone());
                 }
                 continue;
@@ -217,7 +218,7 @@ impl<'a> LogPasses<'a> {
                 let found = jumps(&sums).unwrap_or_default();
                 self.jumps
                     .extend(found.into_iter().map(|jump| (index, jump)));
-                self.warnings.extend(open.in_words(&summary));
+                self.notes.extend(open.notes_with(&summary));
                 self.saw(open.provenance()?, summary);
             }
             all.push(match filter {

@@ -12,12 +12,12 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::open_log::OpenLog;
 use super::own_settings::{CutoffCosts, JointCost, OwnSettings};
+use crate::note::{FitNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::inertia::solve::Fit;
 use cft_ident_core::motion::position_cutoff::{CutoffCost, CutoffTrial, candidates, least};
 use cft_ident_core::motion::{FilterSettings, RunError, Stretch, stretches};
-use cft_ident_core::number;
 use cft_ident_core::robot::friction::sign;
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_files::config::held_out::HeldOut;
@@ -78,8 +78,8 @@ impl CutoffCosts {
         machine: &LoggedRobot,
         columns: &RegressorColumns,
         fit: &Fit,
-    ) -> (Vec<PositionCutoff>, Vec<String>) {
-        let (mut list, mut warnings) = (Vec::new(), Vec::new());
+    ) -> (Vec<PositionCutoff>, Vec<StageNote>) {
+        let (mut list, mut notes) = (Vec::new(), Vec::new());
         for (j, joint) in machine.robot.joint_names().iter().enumerate() {
             let costs = logs.iter().filter_map(|log| log.of_joint[j].as_ref());
             let costs: Vec<&JointCost> = costs.collect();
@@ -108,16 +108,16 @@ impl CutoffCosts {
                 noise: mean(|c| c.at.noise),
                 unit: machine.file.torque_unit(j).to_owned(),
             };
-            warnings.extend(own.wrong(mean(|c| c.best.total()), fit.residual_std[j]));
+            notes.extend(own.wrong(mean(|c| c.best.total()), fit.residual_std[j]));
             list.push(own);
         }
-        (list, warnings)
+        (list, notes)
     }
 }
 
 impl PositionCutoff {
     /// What is wrong with a declared cut-off where the best one costs `best` and rows leave `residual` \[unit\].
-    fn wrong(&self, best: f64, residual: f64) -> Option<String> {
+    fn wrong(&self, best: f64, residual: f64) -> Option<StageNote> {
         let total = self.smear.hypot(self.noise);
         if !self.declared
             || total <= MIN_COST_SHARE_OF_RESIDUAL * residual
@@ -125,23 +125,14 @@ impl PositionCutoff {
         {
             return None;
         }
-        let hz = |x: f64| format!("{} Hz", number::significant(x, 3));
-        let torque = |x: f64| format!("{} {}", number::significant(x, 2), self.unit);
-        let (does, change) = match self.best_hz > self.cutoff_hz {
-            true => ("smears the reversals of", "raise"),
-            false => (
-                "lets the noise of the positions into the friction of",
-                "lower",
-            ),
-        };
-        Some(format!(
-            "position_cutoff_hz = {} {does} {}: {} of the residual's {} rms; {change} it to {}, or leave it out of [filter], and each joint gets what its logs call for",
-            number::significant(self.cutoff_hz, 3),
-            self.joint,
-            torque(total),
-            torque(residual),
-            hz(self.best_hz),
-        ))
+        Some(StageNote::Fit(FitNote::PositionCutoff {
+            joint: self.joint.clone(),
+            cutoff_hz: self.cutoff_hz,
+            best_hz: self.best_hz,
+            cost: total,
+            residual,
+            unit: self.unit.clone(),
+        }))
     }
 }
 
@@ -391,11 +382,12 @@ mod tests {
 
     #[test]
     fn a_declared_cut_off_is_judged_by_what_it_costs_beside_the_best_and_the_residual() {
-        let smeared = declared(0.03, 0.001, 160.0).wrong(0.005, 0.04).unwrap();
+        let said = |note: Option<StageNote>| note.unwrap().to_string();
+        let smeared = said(declared(0.03, 0.001, 160.0).wrong(0.005, 0.04));
         assert!(smeared.starts_with("position_cutoff_hz = 60"), "{smeared}");
         assert!(smeared.contains("smears the reversals of q4"), "{smeared}");
         assert!(smeared.contains("raise it to 160"), "{smeared}");
-        let noisy = declared(0.001, 0.03, 40.0).wrong(0.005, 0.04).unwrap();
+        let noisy = said(declared(0.001, 0.03, 40.0).wrong(0.005, 0.04));
         assert!(noisy.contains("lower it to 40"), "{noisy}");
         // too little of the residual, and next to the best
         assert_eq!(declared(0.03, 0.0, 160.0).wrong(0.005, 0.4), None);

@@ -3,6 +3,7 @@
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use crate::note::{LogNote, StageNote};
 use cft_ident_logs::log::{Layout, Provenance, escape, sha256, shares_rows};
 
 /// Logs by what they are used for.
@@ -38,14 +39,14 @@ pub(crate) fn without_rows_of(machine: &LoggedRobot, logs: &[Log], others: &[Log
     logs.iter().filter(fresh).cloned().collect()
 }
 
-/// A sentence for each two logs with the same rows, for commands that only look; `layout` names the time column
+/// A note for each two logs with the same rows, for commands that only look; `layout` names the time column
 /// where a robot is known.
-pub fn repeated_rows(logs: &[Log], layout: Option<&Layout>) -> Vec<String> {
+pub fn repeated_rows(logs: &[Log], layout: Option<&Layout>) -> Vec<StageNote> {
     let all: Vec<&Log> = logs.iter().collect();
     pairs(&all, layout)
         .map(|(i, k)| {
             let (first, second) = (all[i].shown(), all[k].shown());
-            format!("{second} holds rows that {first} holds: they count twice")
+            StageNote::Log(LogNote::Repeated { first, second })
         })
         .collect()
 }

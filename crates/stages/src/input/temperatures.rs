@@ -3,6 +3,7 @@
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use crate::note::{LogNote, StageNote};
 use cft_ident_core::effect::{AugmentedModel, Law};
 use cft_ident_core::explain::{ErrorText, Explain};
 use cft_ident_core::motion::Stretch;
@@ -73,13 +74,13 @@ impl LoggedRobot {
         }
     }
 
-    /// Puts the temperatures of a log beside its stretches; a column that it lacks is a warning.
+    /// Puts the temperatures of a log beside its stretches; a column that it lacks is noted.
     pub(crate) fn put_temperatures(
         &self,
         log: &Log,
         origin: Instant,
         stretches: &mut [Stretch],
-    ) -> Result<Option<String>, LogError> {
+    ) -> Result<Option<StageNote>, LogError> {
         match self.temperatures(log, origin) {
             Ok(found) => {
                 for stretch in stretches {
@@ -88,7 +89,8 @@ impl LoggedRobot {
                 Ok(None)
             }
             Err(error @ (LogError::MissingColumn { .. } | LogError::Topic { .. })) => {
-                Ok(Some(format!("{error}; no temperature of this log is used")))
+                let why = error.to_string();
+                Ok(Some(StageNote::Log(LogNote::NoTemperature { why })))
             }
             Err(error) => Err(error),
         }

@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::condition::DecidedBy;
-use cft_ident_core::number::{percent, significant};
 
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -226,20 +225,6 @@ pub struct FoundTorqueLimit {
     pub errors: [f64; 2],
 }
 
-impl FoundTorqueLimit {
-    /// As it is reported.
-    pub fn sentence(&self) -> String {
-        let limit = significant(self.limit, 3);
-        let [with, without] = self.errors.map(percent);
-        format!(
-            "saturation of {joint}: above {limit} {} it does not move as its torque says ({} of the rows): the drive gives no more, or something holds the joint. These rows are left out (error {with} with them, {without} without; `torque_limit = {limit}` in [log.joint.{joint}]); if that is wrong: --as-declared",
-            self.unit,
-            percent(self.share),
-            joint = self.joint,
-        )
-    }
-}
-
 /// What the check of a set-up found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct SetupReport {
@@ -255,23 +240,5 @@ impl SetupReport {
     /// What a fit refuses the logs for.
     pub fn refusals(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| finding.sure)
-    }
-}
-
-impl FrictionPower {
-    /// As it is reported.
-    pub fn sentence(&self) -> String {
-        let watts = |x: f64| match x.abs() < 0.01 {
-            true => format!("{x:.2e}"),
-            false => format!("{x:.3}"),
-        };
-        format!(
-            "the friction of {} would drive it: its terms together take {} +- {} {} over the speeds of these logs, where friction takes power above zero; {}",
-            self.joint,
-            watts(self.power),
-            watts(self.std),
-            self.unit,
-            self.cause
-        )
     }
 }

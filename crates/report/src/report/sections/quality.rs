@@ -1,5 +1,7 @@
 //! The contents of the logs and their faults.
 
+use std::fmt::Display;
+
 use crate::report::Writer;
 use crate::report::table::Columns;
 use cft_ident_logs::inspect::{LogFindings, Severity};
@@ -42,7 +44,7 @@ pub struct InspectedLog {
 }
 
 /// The section: every log once, and its faults, the worst first.
-pub fn section(page: &mut Writer, logs: &[InspectedLog], warnings: &[String]) {
+pub fn section(page: &mut Writer, logs: &[InspectedLog], warnings: &[impl Display]) {
     page.heading("Data quality");
     let (mut inspected, mut faults) = (Vec::new(), Vec::<Vec<String>>::new());
     let mut hidden = 0;

@@ -1,6 +1,7 @@
 //! The report of `compare`.
 
 use crate::report::figure::{ErrorFigure, JointBars, OverlayFigure, OverlayPanel};
+use crate::report::json::NO_WARNINGS;
 use crate::report::sections::provenance;
 use crate::report::sections::quality::{self, InspectedLog};
 use crate::report::sections::torque::{self, TorqueDrawing};
@@ -28,7 +29,7 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
     let all: Vec<&ParameterPair> = of.table.parameters.iter().collect();
     let parameters = parameter_table(&all, &letters, &legend);
     let mut everywhere = report.everywhere();
-    everywhere.verdict(&words(of), of.warnings.is_empty());
+    everywhere.verdict(&words(of), of.notes.is_empty());
     if all.len() > MAX_PARAMETERS_ON_SCREEN {
         report.detail().table_apart(parameters);
         let mut differ = of.different();
@@ -48,11 +49,11 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
         terminal.table_apart(error_table(tried, logs, &letters));
         let mut page = report.page();
         page.figure(bars(of, tried, &names).svg());
-        page.list(&of.warnings);
+        page.list(&of.notes);
         page.table(error_table(tried, logs, &names));
         used_before(&mut page, of, &tried.in_memory.inputs);
     } else {
-        report.page().list(&of.warnings);
+        report.page().list(&of.notes);
     }
     let mut page = report.page();
     page.heading("Parameters");
@@ -86,7 +87,7 @@ pub fn pictures(
         let models = [drawn(a, TraceStyle::Before), drawn(b, TraceStyle::After)];
         let title = replayed.logs.join(", ");
         torque::section(page, &of.machine, &replayed.torque, &models, &title);
-        quality::section(page, quality, &[]);
+        quality::section(page, quality, &NO_WARNINGS);
     }
     let summary = of.tried.as_ref().map(|tried| &tried.in_memory.summary);
     let inputs = of.sides.each_ref();

@@ -69,7 +69,7 @@ pub fn pictures(
     friction::section(page, machine, &replayed.friction, &logs);
     page.heading("Correlated parameters");
     fit::pairs(page, of.refined);
-    quality::section(page, quality, &found.in_memory.warnings);
+    quality::section(page, quality, &found.in_memory.notes);
     let mut inputs = vec![of.given.clone()];
     inputs.extend(found.in_memory.inputs.iter().cloned());
     let (summary, made_from) = (Some(&found.in_memory.summary), &of.file.provenance.inputs);

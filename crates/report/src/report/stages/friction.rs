@@ -68,7 +68,7 @@ pub fn pictures(
     nuisance(page, of.machine, of.found);
     page.heading("Correlated parameters");
     fit::pairs(page, of.file);
-    quality::section(page, quality, &of.found.warnings);
+    quality::section(page, quality, &of.found.notes);
     let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
     provenance::section(page, &of.machine.file, &inputs, &[], None, command);
 }

@@ -131,7 +131,7 @@ pub fn pictures(
         residual::section(page, machine, &replayed.residual);
     }
     fit::section(page, of.found, of.file);
-    quality::section(page, quality, &of.found.warnings);
+    quality::section(page, quality, &of.found.notes);
     let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
     let (file, summary) = (&of.machine.file, Some(&of.found.summary));
     provenance::section(page, file, &inputs, &[], summary, command);

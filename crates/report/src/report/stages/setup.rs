@@ -1,12 +1,12 @@
 //! The findings of the check of a set-up, for every report.
 
 use crate::report::Writer;
-use cft_ident_stages::setup::{FindingSeverity, FoundTorqueLimit, FrictionPower, SetupReport};
+use cft_ident_stages::setup::{FindingSeverity, SetupReport};
 
 /// The findings, nothing where there is none.
 pub fn section(out: &mut Writer, report: &SetupReport) {
-    let power = report.friction_power.iter().map(FrictionPower::sentence);
-    let limits = report.torque_limits.iter().map(FoundTorqueLimit::sentence);
+    let power = report.friction_power.iter().map(ToString::to_string);
+    let limits = report.torque_limits.iter().map(ToString::to_string);
     let sentences: Vec<String> = power.chain(limits).collect();
     if report.findings.is_empty() && sentences.is_empty() {
         return;

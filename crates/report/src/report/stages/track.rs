@@ -43,7 +43,7 @@ pub fn track(of: &Tracked) -> Report {
     if let [robot] = of.robots.as_slice() {
         page.table(last(robot));
     }
-    page.list(&of.warnings);
+    page.list(&of.notes);
     let mut robots: Vec<&TrackedRobot> = of.robots.iter().collect();
     robots.sort_by_key(|robot| robot.changes.is_empty());
     for robot in robots.into_iter().take(ROBOTS) {

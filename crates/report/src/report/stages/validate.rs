@@ -49,9 +49,9 @@ pub fn validate(of: &ValidateReport) -> Report {
     let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
     let torque_is = of.machine.file.log.torque_is;
     let mut said = words(judged, (of.limit, torque_is), &escaped(logs));
-    if let Some(shown) = not_a_validation(judged) {
-        let grade = "not a validation";
-        said.found.insert(0, FoundLine { grade, text: shown });
+    if let Some(note) = not_a_validation(judged) {
+        let (grade, text) = ("not a validation", note.to_string());
+        said.found.insert(0, FoundLine { grade, text });
     }
     said.write(&mut report.everywhere());
     used_before(&mut report.everywhere(), of);
@@ -149,7 +149,7 @@ pub fn pictures(
     }
     page.heading("Correlated parameters");
     fit::pairs(page, of.file);
-    quality::section(page, quality, &of.found.warnings);
+    quality::section(page, quality, &of.found.notes);
     let mut inputs = vec![of.given.clone()];
     inputs.extend(of.found.inputs.iter().cloned());
     let (file, made_from) = (&of.machine.file, &of.file.provenance.inputs);

@@ -16,6 +16,7 @@ use super::error::ReducedError;
 use super::factors::{ReducedFactors, ReducedHead};
 use super::reduced_log::{FrictionGiven, MadeWith, ReducedLog, ReducedLogs, ReducedRows};
 use crate::input::own_settings::{CutoffCosts, OwnSettings};
+use crate::note::StageNote;
 use cft_ident_core::motion::{SkippedStretches, Summary};
 use cft_ident_logs::log::{Provenance, REDUCED, begins_with, escape, sha256_of_bytes};
 
@@ -124,7 +125,7 @@ impl ReducedLogs {
         let logs = self.logs().iter().map(|log| LogHead {
             provenance: log.provenance.clone(),
             bounds_s: log.bounds_s,
-            warnings: log.warnings.clone(),
+            warnings: log.notes.iter().map(StageNote::to_string).collect(),
             summary: SummaryHead::of(&log.summary),
             rest_speed: log.own.rest_speed.clone(),
             cutoffs_hz: log.own.cutoffs_hz.clone(),
@@ -263,7 +264,9 @@ fn read_log(made_with: &Arc<MadeWith>, head: LogHead, rest: &mut &[u8]) -> Optio
         made_with: made_with.clone(),
         provenance: head.provenance,
         bounds_s: head.bounds_s,
-        warnings: head.warnings,
+        notes: (head.warnings.into_iter())
+            .map(StageNote::OfReducedLog)
+            .collect(),
         summary: head.summary.summary(),
         own: OwnSettings {
             rest_speed: head.rest_speed,

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::error::ReducedError;
 use super::factors::ReducedFactors;
 use crate::input::own_settings::OwnSettings;
+use crate::note::StageNote;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::late;
@@ -142,8 +143,8 @@ pub struct ReducedLog {
     pub provenance: Provenance,
     /// First and last time of its rows, by the log's own clock [s].
     pub bounds_s: [f64; 2],
-    /// What was left out of it or mended, and what else was reported of it.
-    pub warnings: Vec<String>,
+    /// What was left out of it or mended, and what else was noticed of it, as a file keeps it.
+    pub notes: Vec<StageNote>,
     pub summary: Summary,
     pub(crate) own: OwnSettings,
     /// Greatest speed of each joint [m/s or rad/s].

@@ -1,0 +1,99 @@
+//! What is noticed of a fit.
+
+use super::estimate::EstimatorAccount;
+use crate::input::logged_robot::LoggedRobot;
+use crate::input::unknowns::FittedUnknown;
+use crate::note::{FitNote, NumberWithStd};
+use cft_ident_core::inertia::instruments::ReferenceSource;
+use cft_ident_core::inertia::solution::ConfoundedUnknowns;
+use cft_ident_core::inertia::solve::Fit;
+use cft_ident_core::math::descent::IterationEnding;
+use cft_ident_files::config::campaign::EstimatorKind;
+use cft_ident_files::config::model_file::is_positive;
+
+/// Unknowns of a combination that are named.
+const NAMED_TERMS: usize = 6;
+
+impl EstimatorAccount {
+    /// What did not come as it should.
+    pub(crate) fn notes(&self) -> Vec<FitNote> {
+        let mut out = Vec::new();
+        if self.estimator == EstimatorKind::Oe && !self.law_refined {
+            out.push(FitNote::NothingNonlinear);
+        }
+        if let Some(simulated) = &self.simulated {
+            if simulated.reference == ReferenceSource::Smoothed {
+                out.push(FitNote::SmoothedReference);
+            }
+            if simulated.failed_steps_share > 0.0 {
+                out.push(FitNote::FailedSteps {
+                    share: simulated.failed_steps_share,
+                });
+            }
+        }
+        if self.status == IterationEnding::IterationLimit {
+            out.push(FitNote::NotSettled {
+                estimator: self.estimator,
+                passes: self.iterations,
+            });
+        }
+        out
+    }
+}
+
+/// Share of a joint's rows at rest from which on they are reported.
+const SHOWN_AT_REST: f64 = 0.01;
+
+/// Rows at rest that are not fitted.
+pub(crate) fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<FitNote> {
+    let names = machine.robot.joint_names().iter().cloned();
+    let joints = names.zip(shares.iter().copied());
+    let joints: Vec<(String, f64)> = joints
+        .filter(|(_, share)| *share >= SHOWN_AT_REST)
+        .collect();
+    (!joints.is_empty()).then_some(FitNote::AtRest { joints })
+}
+
+/// Friction and inertias that are below zero by more than two deviations.
+pub(crate) fn negative(unknowns: &[FittedUnknown]) -> Option<FitNote> {
+    let positive = |u: &&FittedUnknown| is_positive(&u.key, u.joint.is_some());
+    let below = |u: &&FittedUnknown| u.fitted < -2.0 * u.fitted_std;
+    let unknowns: Vec<_> = unknowns
+        .iter()
+        .filter(positive)
+        .filter(below)
+        .map(|u| {
+            let name = match &u.joint {
+                Some(joint) => format!("{}:{joint}", u.key),
+                None => u.key.clone(),
+            };
+            let number = NumberWithStd {
+                value: u.fitted,
+                std: u.fitted_std,
+            };
+            (name, number, u.unit.clone())
+        })
+        .collect();
+    (!unknowns.is_empty()).then_some(FitNote::BelowZero { unknowns })
+}
+
+/// What the data do not separate.
+pub(crate) fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<FitNote> {
+    let name = |i: usize| match &unknowns[i].joint {
+        Some(joint) if !unknowns[i].key.contains(joint.as_str()) => {
+            format!("{} of {joint}", unknowns[i].key)
+        }
+        _ => unknowns[i].key.clone(),
+    };
+    let (silent, mixed): (Vec<&ConfoundedUnknowns>, Vec<&ConfoundedUnknowns>) =
+        fit.confounded.iter().partition(|c| c.terms.len() == 1);
+    let silent: Vec<String> = silent.iter().map(|c| name(c.terms[0].0)).collect();
+    let silent = (!silent.is_empty()).then_some(FitNote::NotExcited { unknowns: silent });
+    let mixed = mixed.iter().map(|c| {
+        let most = c.terms.iter().take(NAMED_TERMS);
+        FitNote::Confounded {
+            terms: most.map(|(i, x)| (name(*i), *x)).collect(),
+        }
+    });
+    silent.into_iter().chain(mixed).collect()
+}
