@@ -163,12 +163,9 @@ impl JointFit {
         let Some(gram) = sum(&|j| of_joint[j].clone()) else {
             return out;
         };
-        let across = sum(&|j| self.products(&self.total[j], j, &free, &effect.slopes));
-        let (Some(factor), Some(across)) = (firm(&gram, numbers.ridge).cholesky(), across) else {
+        let Some(by_shape) = self.by_shape(&free, &effect.slopes, numbers) else {
             return out;
         };
-        // the torque that a change of shape makes, along the columns of the coefficients
-        let by_shape = factor.solve(&across);
         let along =
             |x: &DVector<f64>| x.select_rows(&free) + &by_shape * x.select_rows(&effect.slopes);
         let amplitude = along(&self.values);
@@ -223,6 +220,30 @@ impl JointFit {
             .floor
             .map_or(0.0, |floor| (1.0 - floor / out.f).max(0.0));
         out
+    }
+
+    /// The torque that a change of shape makes, along the columns of the coefficients, both beside all other terms: where a
+    /// spring rests is no part of its amplitude if a torque offset holds it as well.
+    fn by_shape(
+        &self,
+        free: &[usize],
+        slopes: &[usize],
+        numbers: &Numbers,
+    ) -> Option<DMatrix<f64>> {
+        let normal = self.terms.information(&self.total);
+        let is_other = |i: &usize| !free.contains(i) && !slopes.contains(i);
+        let others: Vec<usize> = (0..self.terms.len()).filter(is_other).collect();
+        let part = |a: &[usize], b: &[usize]| normal.select_rows(a).select_columns(b);
+        let explained = firm(&part(&others, &others), numbers.ridge)
+            .cholesky()?
+            .solve(&part(&others, free))
+            .transpose();
+        let beside = |columns: &[usize]| part(free, columns) - &explained * part(&others, columns);
+        Some(
+            firm(&beside(free), numbers.ridge)
+                .cholesky()?
+                .solve(&beside(slopes)),
+        )
     }
 
     /// Part of the information on an amplitude that each block holds: of the square of its torque beside what all other

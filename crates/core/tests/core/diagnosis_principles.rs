@@ -156,6 +156,12 @@ fn effects_of_every_kind_are_named_and_measured() {
     assert_eq!(written(&found), ["position-friction"]);
     near(value(&found, "position-friction", "sin"), 0.5, 0.1);
 
+    // where a straight spring is at rest is the torque offset, which is open here; how stiff it is shows
+    let spring = |_: f64, [q, ..]: [f64; 3]| 0.9 * (q - 0.2);
+    let (_, found) = of(&spring);
+    assert_eq!(written(&found), ["spring"]);
+    near(value(&found, "spring", "k"), 0.9, 0.02);
+
     // a spring that bends is no constant torque wherever it is at rest
     let spring = |_: f64, [q, ..]: [f64; 3]| 0.9 * (q - 0.2) + 1.5 * (q - 0.2).powi(3);
     let (_, found) = of(&spring);
