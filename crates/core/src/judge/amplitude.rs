@@ -154,16 +154,7 @@ impl JointFit {
             .clone()
             .map(|j| self.products(&self.total[j], j, &free, &free))
             .collect();
-        let sum = |of: &dyn Fn(usize) -> DMatrix<f64>| {
-            let weighed = joints.clone().map(|j| of(j) * self.terms.weights[j]);
-            weighed.fold(None, |sum: Option<DMatrix<f64>>, x| {
-                Some(sum.map_or(x.clone(), |s| s + x))
-            })
-        };
-        let Some(gram) = sum(&|j| of_joint[j].clone()) else {
-            return out;
-        };
-        let Some(by_shape) = self.by_shape(&free, &effect.slopes, numbers) else {
+        let Some((beside, by_shape)) = self.beside_others(&free, &effect.slopes, numbers) else {
             return out;
         };
         let along =
@@ -179,7 +170,7 @@ impl JointFit {
         map.view_mut((0, k), (k, effect.slopes.len()))
             .copy_from(&by_shape);
         spread += &map * known * map.transpose();
-        let pull = &gram * &amplitude;
+        let pull = &beside * &amplitude;
         let size = amplitude.dot(&pull);
         if k == 0 || size.is_nan() || size <= 0.0 {
             return out;
@@ -222,14 +213,14 @@ impl JointFit {
         out
     }
 
-    /// The torque that a change of shape makes, along the columns of the coefficients, both beside all other terms: where a
-    /// spring rests is no part of its amplitude if a torque offset holds it as well.
-    fn by_shape(
+    /// Products of the columns of coefficients beside all other terms, and the torque that a change of shape makes along
+    /// them: where a spring rests is no part of its amplitude if a torque offset holds it as well.
+    fn beside_others(
         &self,
         free: &[usize],
         slopes: &[usize],
         numbers: &Numbers,
-    ) -> Option<DMatrix<f64>> {
+    ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let normal = self.terms.information(&self.total);
         let is_other = |i: &usize| !free.contains(i) && !slopes.contains(i);
         let others: Vec<usize> = (0..self.terms.len()).filter(is_other).collect();
@@ -239,11 +230,9 @@ impl JointFit {
             .solve(&part(&others, free))
             .transpose();
         let beside = |columns: &[usize]| part(free, columns) - &explained * part(&others, columns);
-        Some(
-            firm(&beside(free), numbers.ridge)
-                .cholesky()?
-                .solve(&beside(slopes)),
-        )
+        let own = beside(free);
+        let by_shape = firm(&own, numbers.ridge).cholesky()?.solve(&beside(slopes));
+        Some((own, by_shape))
     }
 
     /// Part of the information on an amplitude that each block holds: of the square of its torque beside what all other
