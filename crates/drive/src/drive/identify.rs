@@ -402,7 +402,7 @@ fn unseen(
 /// Steps of a fit without a motion, from the fit with it.
 const UNSEEN_STEPS: usize = 8;
 
-/// Steps that make held-out logs worse leave.
+/// Steps that make held-out logs worse leave, by the fit to all others or by one that saw no log of their motion.
 fn confirm_held_out(problem: &DriveProblem, found: &mut FoundDrive, held_out: &[&DriveLog]) {
     if held_out.is_empty() {
         return;
@@ -413,7 +413,11 @@ fn confirm_held_out(problem: &DriveProblem, found: &mut FoundDrive, held_out: &[
         }
         let less = estimate::without(problem, &found.refined, found.steps[at].effect);
         let with = errors_on(problem, &found.refined, held_out).mae(None);
-        if with > errors_on(problem, &less, held_out).mae(None) {
+        let worse = with > errors_on(problem, &less, held_out).mae(None);
+        let [with, without] = [&found.refined, &less].map(|law| unseen(problem, law, held_out));
+        // what foretells a motion that was fitted at another gain may still fail at one that was not
+        let pair = with.zip(without);
+        if worse || pair.is_some_and(|(with, without)| with.mae(None) > without.mae(None)) {
             found.steps[at].status = StepCertainty::HeldOutWorse;
             found.refined = less;
         }
