@@ -92,7 +92,12 @@ impl RobotChains {
     /// Positions of all joints along a log, as the encoders would read them.
     pub fn roll(&self, log: &DriveLog, frame: RollOutFrame, law: &MachineLaw) -> Vec<Vec<f64>> {
         let roll = |speeds: &[f64], count: usize| self.roll_from(log, (frame, law), speeds, count);
-        self.roll_from(log, (frame, law), &first_speeds(log, roll), log.t.len())
+        self.roll_from(
+            log,
+            (frame, law),
+            &first_speeds(&log.t, &log.joints, roll),
+            log.t.len(),
+        )
     }
 
     /// The first so many positions from speeds at the first sample \[rad/s\].

@@ -78,10 +78,10 @@ pub(super) fn fit_limits(
         return best;
     }
     let found = best.values.clone();
+    let law = problem.frame.law(unknowns, &found);
     for part in LIMITED {
         let mut acting = found.clone();
         for i in &out {
-            let law = problem.frame.law(unknowns, &found);
             let j = unknowns[*i].joint.unwrap_or(0);
             let gains = problem.logs.iter().map(|log| log.joints[j].kp);
             let gain = law.joints[j].stiffness * gains.fold(0.0, f64::max);

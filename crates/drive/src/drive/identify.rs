@@ -92,18 +92,18 @@ pub struct IdentifiedDrives {
     pub before: DriveErrorsByUse,
     pub after: DriveErrorsByUse,
     /// Laws that these data do not tell from the one that is written.
-    pub others: Vec<OtherLaw>,
+    pub others: OtherLaws,
     /// Positions of some logs, held-out ones first.
     pub courses: Vec<PositionCourse>,
 }
 
-/// A law with another effect in the place of one that is written.
+/// Laws with another effect in the place of one that is written.
 #[derive(Debug, Clone)]
-pub struct OtherLaw {
-    pub effect: DriveEffect,
-    pub law: LawEstimate,
-    /// The law that is written, by the same steps.
+pub struct OtherLaws {
+    /// The law that is written, by the steps of the others.
     pub written: LawEstimate,
+    /// Each with the effect that it has instead.
+    pub each: Vec<(DriveEffect, LawEstimate)>,
 }
 
 /// Positions along a log, joint after joint [rad].
@@ -407,19 +407,22 @@ fn confirm_held_out(problem: &DriveProblem, found: &mut FoundDrive, held_out: &[
     if held_out.is_empty() {
         return;
     }
+    // what foretells a motion that was fitted at another gain may still fail at one that was not
+    let errors = |law: &LawEstimate| {
+        let unseen = unseen(problem, law, held_out);
+        [Some(errors_on(problem, law, held_out)), unseen].map(|errors| errors.map(|e| e.mae(None)))
+    };
+    let mut with = errors(&found.refined);
     for at in (0..found.steps.len()).rev() {
         if !found.steps[at].written() {
             continue;
         }
         let less = estimate::without(problem, &found.refined, found.steps[at].effect);
-        let with = errors_on(problem, &found.refined, held_out).mae(None);
-        let worse = with > errors_on(problem, &less, held_out).mae(None);
-        let [with, without] = [&found.refined, &less].map(|law| unseen(problem, law, held_out));
-        // what foretells a motion that was fitted at another gain may still fail at one that was not
-        let pair = with.zip(without);
-        if worse || pair.is_some_and(|(with, without)| with.mae(None) > without.mae(None)) {
+        let without = errors(&less);
+        let mut pairs = with.iter().zip(&without);
+        if pairs.any(|(with, without)| with > without) {
             found.steps[at].status = StepCertainty::HeldOutWorse;
-            found.refined = less;
+            (found.refined, with) = (less, without);
         }
     }
 }
@@ -444,33 +447,33 @@ fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
 
 /// The laws that do nearly as well in the end: a written effect exchanged for one that stood beside it when it joined.
 /// What stands in the model too, or does worse with everything else fitted, is no alternative.
-fn other_laws(problem: &DriveProblem, found: &mut FoundDrive) -> Vec<OtherLaw> {
-    let written: Vec<_> = found.steps.iter().filter(|step| step.written()).collect();
-    let written: Vec<DriveEffect> = written.iter().map(|step| step.effect).collect();
+fn other_laws(problem: &DriveProblem, found: &mut FoundDrive) -> OtherLaws {
+    let written = found.steps.iter().filter(|step| step.written());
+    let written: Vec<DriveEffect> = written.map(|step| step.effect).collect();
+    for step in &mut found.steps {
+        let stands = written.contains(&step.effect);
+        (step.alternatives).retain(|other| stands && !written.contains(other));
+    }
+    let mut out = OtherLaws {
+        written: found.refined.clone(),
+        each: Vec::new(),
+    };
+    if found.steps.iter().all(|step| step.alternatives.is_empty()) {
+        return out;
+    }
     let coarse = problem.by_steps(COARSE_STEP);
-    let refined = &found.refined;
-    let refined = estimate::fit(
-        &coarse,
-        &refined.unknowns,
-        &refined.values,
-        Some(&refined.scales),
-    );
-    let mut laws = Vec::new();
+    let LawEstimate {
+        unknowns, values, ..
+    } = &found.refined;
+    out.written = estimate::fit(&coarse, unknowns, values, Some(&found.refined.scales));
     for step in &mut found.steps {
         let own = step.effect;
         step.alternatives.retain(|other| {
-            if !written.contains(&own) || written.contains(other) {
-                return false;
-            }
-            let near = search::near_exchange(&coarse, &refined, own, *other);
+            let near = search::near_exchange(&coarse, &out.written, own, *other);
             let is_near = near.is_some();
-            laws.extend(near.map(|law| OtherLaw {
-                effect: *other,
-                law,
-                written: refined.clone(),
-            }));
+            out.each.extend(near.map(|law| (*other, law)));
             is_near
         });
     }
-    laws
+    out
 }

@@ -3,7 +3,8 @@
 use cft_ident_core::number::{plus_minus, significant};
 
 use super::candidate::DriveEffect;
-use super::identify::{self, BlocksAre, DriveErrorsByUse, IdentifiedDrives, OtherLaw};
+use super::estimate::LawEstimate;
+use super::identify::{self, BlocksAre, DriveErrorsByUse, IdentifiedDrives};
 use super::law::DriveLawKind;
 use super::numbers::{given, in_figures, parameter, part, step};
 use super::outcome::{
@@ -129,17 +130,18 @@ impl FurthestOther {
 impl IdentifiedDrives {
     /// Of a number of the law that is written; none where there is no other law.
     fn furthest_other(&self, unknown: DriveUnknown) -> Option<FurthestOther> {
-        let of = |other: &OtherLaw| {
-            // a law without the number has none of it
-            let [value, written] =
-                [&other.law, &other.written].map(|law| law.value(unknown).unwrap_or(0.0));
+        // a law without the number has none of it
+        let of_law = |law: &LawEstimate| law.value(unknown).unwrap_or(0.0);
+        let written = of_law(&self.others.written);
+        let of = |(effect, law): &(DriveEffect, LawEstimate)| {
+            let value = of_law(law);
             FurthestOther {
-                effect: other.effect,
+                effect: *effect,
                 value,
                 shift: (value - written).abs(),
             }
         };
-        let all = self.others.iter().map(of);
+        let all = self.others.each.iter().map(of);
         all.max_by(|a, b| a.shift.total_cmp(&b.shift))
     }
 }

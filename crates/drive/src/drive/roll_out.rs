@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::law::{DriveLawKind, JointLaw, MachineLaw};
 use super::set_point::{CommandLines, SetPointFollower};
-use super::track::{DriveLoad, DriveLog};
+use super::track::{DriveLoad, DriveLog, JointTrack};
 
 /// Longest step of the roll-outs that choose effects [s]. Half: by the numbers of a simulated servo, whose encoder alone
 /// makes 0.38 mrad, positions are missed by 0.41 mrad in place of 0.44; twice: by 0.56 mrad.
@@ -37,20 +37,24 @@ const SPEED_STEP: f64 = 1e-3;
 
 /// Speeds with which the joints of a log begin [rad/s]: those whose motion lies nearest to the first positions. A slope of
 /// the first samples would be that of what the drive does meanwhile. `roll` gives the first so many positions from speeds.
-pub fn first_speeds(log: &DriveLog, roll: impl Fn(&[f64], usize) -> Vec<Vec<f64>>) -> Vec<f64> {
-    let end = log.t[0] + BEGIN;
-    let count = log.t.partition_point(|t| *t <= end);
-    let n = log.joints.len();
+pub fn first_speeds(
+    t: &[f64],
+    tracks: &[JointTrack],
+    roll: impl Fn(&[f64], usize) -> Vec<Vec<f64>>,
+) -> Vec<f64> {
+    let end = t[0] + BEGIN;
+    let count = t.partition_point(|t| *t <= end);
+    let n = tracks.len();
     let mut speeds = vec![0.0; n];
     if count <= FEW {
         return speeds;
     }
-    let slope = |q: &[f64]| (q[FEW] - q[0]) / (log.t[FEW] - log.t[0]);
-    for (speed, track) in speeds.iter_mut().zip(&log.joints) {
+    let slope = |q: &[f64]| (q[FEW] - q[0]) / (t[FEW] - t[0]);
+    for (speed, track) in speeds.iter_mut().zip(tracks) {
         *speed = slope(&track.position);
     }
     let off = |at: &[Vec<f64>]| -> Vec<f64> {
-        let pairs = at.iter().zip(&log.joints);
+        let pairs = at.iter().zip(tracks);
         let off = pairs.map(|(at, track)| at.iter().zip(&track.position).map(|(x, q)| x - q));
         off.flatten().collect()
     };
@@ -115,7 +119,7 @@ impl RolledDrive {
             kd: ratio * kd,
             most: law.torque_max
                 * if matches!(kind, DriveLawKind::Volts(_)) {
-                    supply
+                    supply.abs()
                 } else {
                     1.0
                 },
@@ -130,7 +134,7 @@ impl RolledDrive {
         &self,
         (follower, command): (&mut SetPointFollower, &mut CommandLines),
         (to, h): (f64, f64),
-        (seen, bias): (SeenLimits, f64),
+        (seen, bias): (SeenState, f64),
     ) -> (f64, f64) {
         let (mut begin, mut impulse, mut free) = (0.0, 0.0, 0.0);
         follower.up_to(command, to, &mut |part| {
@@ -145,14 +149,19 @@ impl RolledDrive {
             free += part.long * share;
             begin = end;
         });
-        (impulse / begin, self.kd * free / begin)
+        match begin > 0.0 {
+            true => (impulse / begin, self.kd * free / begin),
+            // a step below what a clock tells apart
+            false => (0.0, 0.0),
+        }
     }
 }
 
 /// Mean of what is limited to +-most along a straight line, and the share of it that is not limited.
 #[inline]
 fn limited_mean([from, to]: [f64; 2], most: f64) -> (f64, f64) {
-    let [low, high] = [from, to].map(|x| x.clamp(-most, most));
+    // a limit that is no number is none: a supply of 0 V times a limit that is never reached
+    let [low, high] = [from, to].map(|x| x.max(-most).min(most));
     if (low, high) == (from, to) {
         return (0.5 * (from + to), 1.0);
     }
@@ -176,16 +185,13 @@ pub fn roll_axis(
     joint: usize,
     out: &mut [f64],
 ) {
-    let only = DriveLog {
-        joints: vec![log.joints[joint].clone()],
-        ..log.clone()
-    };
+    let only = std::slice::from_ref(&log.joints[joint]);
     let roll = |speeds: &[f64], count: usize| {
         let mut out = vec![0.0; count];
         roll_from(log, (frame, law), joint, speeds[0], &mut out);
         vec![out]
     };
-    let speed = first_speeds(&only, roll)[0];
+    let speed = first_speeds(&log.t, only, roll)[0];
     roll_from(log, (frame, law), joint, speed, out);
 }
 
@@ -252,7 +258,7 @@ fn roll_from(
 
 /// What a late controller sees.
 #[derive(Debug, Clone, Copy)]
-pub struct SeenLimits {
+pub struct SeenState {
     pub q: f64,
     pub v: f64,
     /// Part of the step's own change of speed in `v`, doubled: 1 where the controller is in time.
@@ -291,16 +297,16 @@ impl PastStates {
 
     /// What is seen in the middle of a step that begins with speed `v` and is at `half` in its middle.
     #[inline]
-    pub fn seen(&mut self, begin: f64, h: f64, half: f64, v: f64) -> SeenLimits {
+    pub fn seen(&mut self, begin: f64, h: f64, half: f64, v: f64) -> SeenState {
         if self.late <= 0.0 {
-            return SeenLimits {
+            return SeenState {
                 q: half,
                 v,
                 own: 1.0,
             };
         }
         if self.late < 0.5 * h {
-            return SeenLimits {
+            return SeenState {
                 q: half - self.late * v,
                 v,
                 own: 1.0 - 2.0 * self.late / h,
@@ -318,7 +324,7 @@ impl PastStates {
             }
             _ => (q0 + v0 * (time - t0).min(0.0), v0),
         };
-        SeenLimits { q, v, own: 0.0 }
+        SeenState { q, v, own: 0.0 }
     }
 }
 
@@ -345,5 +351,6 @@ mod tests {
             assert!((share - free).abs() < 1e-4, "{from} {to}: {share} {free}");
         }
         assert_eq!(limited_mean([7.0, 7.0], f64::INFINITY), (7.0, 1.0));
+        assert_eq!(limited_mean([1.0, 2.0], f64::NAN), (1.5, 1.0));
     }
 }

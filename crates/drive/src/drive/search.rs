@@ -1,8 +1,9 @@
 //! The search for what a drive has beside gain, damping, dry friction and armature.
 //!
 //! Every effect is fitted with everything else free from a few starts; of those that help the blocks left out the one that
-//! helps most joins, and again. Then the jackknife judges: what is not sure leaves, the least sure first, and the rest is
-//! fitted and asked again.
+//! helps most joins, and again; once more from the second best, and the better of both models stands. Then the jackknife
+//! judges: what is not sure leaves, the least sure first, and the rest is fitted and asked again, until nothing is left
+//! without which other blocks are foretold as well.
 
 use std::collections::BTreeMap;
 
@@ -145,6 +146,7 @@ fn settle_rivals(
 type JoinedEffect = (DriveEffect, [f64; 2], Vec<DriveEffect>);
 
 /// A model on its way: what it is fitted as, what joined, and what was tried last and not taken.
+#[derive(Clone)]
 struct GrowingLaw {
     at: LawEstimate,
     joined: Vec<JoinedEffect>,
@@ -158,16 +160,16 @@ pub fn search(
     possible: &[DriveEffect],
     doing: &dyn Fn(&str),
 ) -> FoundDrive {
-    let begin = GrowingLaw {
+    let mut begin = GrowingLaw {
         at: given,
         joined: Vec::new(),
         tried: Vec::new(),
     };
     let (firsts, tried) = rivals(problem, &begin, possible, doing);
+    begin.tried = tried;
     // one effect may stand for two others, which show where it does not come first
     let grown = (0..firsts.len().min(RIVALS)).map(|k| {
-        let mut law = begin.joined_by(problem, &firsts, k);
-        law.tried.clone_from(&tried);
+        let law = begin.clone().joined_by(problem, &firsts, k);
         grow(problem, law, possible, doing)
     });
     let best = grown.reduce(|best, other| {
@@ -178,11 +180,7 @@ pub fn search(
             false => best,
         }
     });
-    let best = best.unwrap_or(GrowingLaw {
-        tried,
-        at: begin.at.clone(),
-        joined: Vec::new(),
-    });
+    let best = best.unwrap_or_else(|| begin.clone());
     let fine = problem.by_steps(FINE_STEP);
     let refit = |law: &LawEstimate| fit(&fine, &law.unknowns, &law.values, Some(&law.scales));
     let given = refit(&begin.at);
@@ -211,23 +209,15 @@ fn grow(
 
 impl GrowingLaw {
     /// The same with the effect at a place of the list of rivals.
-    fn joined_by(&self, problem: &DriveProblem, sorted: &[RivalEffect], place: usize) -> Self {
+    fn joined_by(mut self, problem: &DriveProblem, sorted: &[RivalEffect], place: usize) -> Self {
         let own = &sorted[place];
         let others = sorted.iter().filter(|other| other.effect != own.effect);
         let near = others.filter(|other| other.is_near(own));
         let alternatives = near.map(|other| other.effect).collect();
-        let mut joined = self.joined.clone();
-        joined.push((own.effect, own.gain, alternatives));
-        GrowingLaw {
-            at: fit(
-                problem,
-                &own.with.unknowns,
-                &own.with.values,
-                Some(&self.at.scales),
-            ),
-            joined,
-            tried: self.tried.clone(),
-        }
+        self.joined.push((own.effect, own.gain, alternatives));
+        let scales = Some(&self.at.scales);
+        self.at = fit(problem, &own.with.unknowns, &own.with.values, scales);
+        self
     }
 }
 

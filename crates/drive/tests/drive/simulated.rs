@@ -87,6 +87,19 @@ fn roll_outs_by_the_numbers_of_the_simulator_are_off_by_half_a_step_of_its_encod
 }
 
 #[test]
+fn rows_without_supply_or_with_a_wrong_sign_of_it_are_rolled_through() {
+    let mut log = logs(&ServoPlant::HOBBY, &[8.0], 3).remove(0);
+    log.joints[0].supply = vec![12.0; log.t.len()];
+    log.joints[0].supply[3..6].copy_from_slice(&[0.0, -12.0, f64::NAN]);
+    let mut law = truth(&ServoPlant::HOBBY);
+    law.joints[0].torque_max = f64::INFINITY;
+    let kind = DriveLawKind::Volts(ServoFirmware::default());
+    let mut out = vec![0.0; log.t.len()];
+    roll_axis(&log, (kind, FINE_STEP), &law, 0, &mut out);
+    assert!(out.iter().all(|q| q.is_finite()));
+}
+
+#[test]
 fn a_late_command_and_a_speed_limit_are_named_with_their_sizes() {
     let found = identified(&LIMITED, 5);
     let drives = DriveResult::new(&found);
