@@ -255,10 +255,9 @@ pub(crate) fn before_these(
 ) -> Result<(ModelFile, Vec<FrictionPrior>), IdentifyError> {
     let mut model = file.clone();
     let mut priors = Vec::new();
-    if file.robot.friction_law() != FrictionLawKind::DoubleTanh {
-        return Ok((model, priors));
-    }
-    for joint in file.robot.joint_names() {
+    let joints = file.robot.joint_names().into_iter();
+    // by what the model holds: a robot file may name another law than the friction that was given to its fit has
+    for joint in joints.filter(|joint| file.has_law(FrictionLawKind::DoubleTanh, joint)) {
         let prior = prior_of((name, file), &joint, given)?;
         let keys = DoubleTanh::NAMES.map(|key| format!("{key}:{joint}"));
         let changed = file.double_tanh(name, &joint)?.parameters();

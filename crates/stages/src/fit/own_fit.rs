@@ -17,7 +17,6 @@ use cft_ident_core::diagnose::{ModelProposal, Unknown, value_of};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
 use cft_ident_files::config::ModelFile;
-use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::Provenance;
 
 /// How the declared numbers of a proposal are fitted.
@@ -57,9 +56,12 @@ impl OwnFit {
         let fitted: Vec<&Provenance> = made.inputs.iter().filter(|input| input.made()).collect();
         let by_these = fitted.len() == inputs.len()
             && inputs.iter().all(|b| fitted.iter().any(|a| same(a, b)));
-        let by_lsq = made.command == "lsq" && made.estimator.is_none();
-        let known = given.file.robot.friction_law() == FrictionLawKind::DoubleTanh
-            && !given.file.friction_prior.is_empty();
+        let known = !given.file.friction_prior.is_empty();
+        // friction that was not known before is of the law that the robot file names
+        let law = given.file.robot.friction_law();
+        let joints = given.file.robot.joint_names();
+        let of_law = known || joints.iter().all(|joint| given.file.has_law(law, joint));
+        let by_lsq = made.command == "lsq" && made.estimator.is_none() && of_law;
         (by_these && by_lsq && !keep).then(|| OwnFit {
             friction: known.then(|| GivenModel {
                 file: before.clone(),
