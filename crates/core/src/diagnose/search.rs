@@ -45,6 +45,15 @@ impl<'a> Field<'a> {
         &self.prepared.case.numbers
     }
 
+    /// The numbers by which an effect is judged.
+    pub fn numbers_of(&self, effect: &ModelEffect) -> Numbers {
+        let numbers = self.numbers();
+        match effect.law.entry.declared {
+            true => numbers.of_declared(),
+            false => *numbers,
+        }
+    }
+
     pub fn effect(&self, chosen: &ChosenCandidate) -> &'a ModelEffect {
         &self.candidates[chosen.candidate].effect
     }

@@ -471,7 +471,7 @@ impl EffectJudge<'_> {
             status,
             left,
             shrinkage: s,
-            deviations: amplitude.deviations(numbers),
+            deviations: amplitude.deviations(&self.field.numbers_of(effect)),
             torque: amplitude.torque,
             blocks: amplitude.blocks,
             parts: verified.blocks.clone(),

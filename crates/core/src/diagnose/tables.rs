@@ -72,9 +72,10 @@ impl EffectEstimates {
         at: usize,
         noisier: Option<&[DMatrix<f64>]>,
     ) -> Result<VerifiedEffect, DiagnoseError> {
-        let numbers = field.numbers();
+        let own = field.effect(&effects[at]);
+        let numbers = &field.numbers_of(own);
         let terms = &self.places[at].terms;
-        let measured = field.effect(&effects[at]).law.entry.measurable;
+        let measured = own.law.entry.measurable;
         let beside = beside_the_others(field, effects, at)?;
         Ok(VerifiedEffect {
             amplitude: self.fit.amplitude(terms, (noisier, measured), numbers),

@@ -17,12 +17,13 @@ pub static ENTRY: Entry = Entry {
     ],
     search: ShapeSearch::Refined,
     friction: true,
+    declared: true,
     must: &[
         Rule::not_negative("fc", "friction acts against the motion"),
         Rule::at_most(
             LimitedNumber::Key("vs"),
-            Limit::TopSpeed(0.3),
-            "Coulomb friction is reached well below the top speed",
+            Limit::TopSpeed(1.0 / 6.0),
+            "Coulomb friction is reached before half of the top speed (tanh 3 = 0.995)",
         ),
     ],
     otherwise: Some(CurveSignal::Speed),
