@@ -6,8 +6,8 @@ use super::{CliError, Context};
 use cft_ident_files::config::correction::{KeyEdit, edited};
 use cft_ident_files::config::{self, RobotFile};
 use cft_ident_stages::identify::{
-    AcceptedSetup, ContradictedSetup, Dataset, IdentifyError, SetupRefusal, accepted_setup,
-    check_setup,
+    AcceptedSetup, ContradictedSetup, Dataset, SetupRefusal, accepted_setup,
+    check_setup_where_possible,
 };
 use cft_ident_stages::setup::{Finding, FindingSeverity, SetupReport};
 
@@ -103,11 +103,7 @@ fn tell_hints(report: &SetupReport, context: &Context) {
 
 /// What the check says of these logs, for a command that only reports it.
 pub fn report(data: &Dataset, context: &Context) -> Result<SetupReport, CliError> {
-    match check_setup(data, &context.control) {
-        Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
-        // logs that cannot be checked are reported by the stage itself
-        found => Ok(found.unwrap_or_default().report),
-    }
+    Ok(check_setup_where_possible(data, &context.control)?.report)
 }
 
 /// Text of the new robot file: the user's with the lines that differ, else the whole anew.

@@ -26,7 +26,7 @@ pub use crate::campaign::{Campaigned, IdentifySettings, StageEnd, identify};
 pub use crate::find::accepted_setup::{
     AcceptedSetup, ContradictedSetup, SetupRefusal, accepted_setup,
 };
-pub use crate::find::check_setup::{CheckedSetup, check_setup};
+pub use crate::find::check_setup::{CheckedSetup, check_setup, check_setup_where_possible};
 pub use crate::find::diagnose::{DataFault, DiagnoseEnd, DiagnoseSettings, Diagnosed, diagnose};
 pub use crate::find::diagnosis::{DiagnosisResult, DiagnosisVerdict, accept_option, signal_words};
 pub use crate::find::formulas::{FormulaResult, formula_result, formula_section, numbers_of};

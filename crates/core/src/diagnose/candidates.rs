@@ -4,7 +4,7 @@ use super::problem::case::DiagnosisCase;
 pub use super::problem::pass::EffectCandidate;
 use crate::effect::{
     AugmentedModel, EffectPlace, Family, LAWS, Law, LimitContext, LimitedNumber, LogCoverage,
-    ModelEffect, Role, Rule, ShapeSearch, ShapeSpan,
+    ModelEffect, Role, Rule, ShapeSearch, ShapeSpan, Unit,
 };
 use crate::judge::Bound;
 use crate::number;
@@ -202,11 +202,20 @@ pub fn no_finding(
 /// Values that a coefficient can have.
 fn bound(effect: &ModelEffect, key: &str, seen: &LimitContext) -> Bound {
     let mut bound = Bound::NONE;
-    for rule in effect.law.entry.must {
+    let entry = effect.law.entry;
+    // no friction is greater than all that the joint ever took
+    if entry.friction
+        && entry
+            .key(key)
+            .is_some_and(|key| key.size && key.unit == Unit::Torque)
+    {
+        (bound.least, bound.most) = (-seen.cover.torque, seen.cover.torque);
+    }
+    for rule in entry.must {
         match rule.of {
             LimitedNumber::Key(of) if of == key => {
-                bound.least = rule.least_of(seen).unwrap_or(bound.least);
-                bound.most = rule.most_of(seen).unwrap_or(bound.most);
+                bound.least = bound.least.max(rule.least_of(seen).unwrap_or(bound.least));
+                bound.most = bound.most.min(rule.most_of(seen).unwrap_or(bound.most));
             }
             LimitedNumber::Size(of) if of == key => {
                 if let Some(most) = rule.most_of(seen) {

@@ -355,6 +355,9 @@ impl EffectJudge<'_> {
                 most = Some((i, cost));
             }
         }
+        // the harm of what the user wants is no reason against the others
+        let wanted = set.iter().any(|i| ways[*i].accepted);
+        let most = most.filter(|(_, cost)| *cost > 0.0 || !wanted);
         Ok(most.map(|(i, _)| i))
     }
 

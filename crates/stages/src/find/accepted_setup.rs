@@ -1,9 +1,8 @@
 //! The check of a set-up before a fit, and what the fit goes on with.
 
-use super::check_setup::check_setup;
+use super::check_setup::check_setup_where_possible;
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
-use crate::input::error::IdentifyError;
 use crate::input::logged_robot::LoggedRobot;
 use crate::note::{SetupNote, StageNote};
 use crate::setup::{Finding, FindingSeverity, SetupReport};
@@ -42,10 +41,8 @@ pub enum SetupRefusal {
 /// # Errors
 /// [`SetupRefusal::Contradicted`] where the torques plainly contradict the robot file, and interruption.
 pub fn accepted_setup(data: Dataset, control: &Control) -> Result<AcceptedSetup, SetupRefusal> {
-    let found = match check_setup(&data, control) {
-        Err(IdentifyError::Interrupted) => return Err(SetupRefusal::Interrupted),
-        found => found.unwrap_or_default(),
-    };
+    let found = check_setup_where_possible(&data, control);
+    let found = found.map_err(|_| SetupRefusal::Interrupted)?;
     let report = found.report;
     let likely = |f: &&Finding| f.severity == FindingSeverity::Warning;
     let likely = report.findings.iter().filter(likely).cloned();

@@ -33,6 +33,20 @@ pub struct CheckedSetup {
     pub limited: Option<LoggedRobot>,
 }
 
+/// [`check_setup`] where the logs can be checked; of others the stage that reads them says why they cannot.
+///
+/// # Errors
+/// [`IdentifyError::Interrupted`] alone.
+pub fn check_setup_where_possible(
+    data: &Dataset,
+    control: &Control,
+) -> Result<CheckedSetup, IdentifyError> {
+    match check_setup(data, control) {
+        Err(IdentifyError::Interrupted) => Err(IdentifyError::Interrupted),
+        found => Ok(found.unwrap_or_default()),
+    }
+}
+
 /// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
 /// logs are passed over: they hold no rows to look at, and were checked when they were made.
 pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, IdentifyError> {
