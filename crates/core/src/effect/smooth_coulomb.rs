@@ -50,7 +50,7 @@ pub static LAW: Law = Law {
     starts: |cover, place| {
         let lack = "fewer than two reversals: low speeds are passed too rarely";
         let top = cover.reversing(place, 2, lack)?.fastest();
-        let shares = [0.2, 0.1, 0.05, 0.02, 0.01, 0.005];
+        let shares = [0.1, 0.05, 0.02, 0.01, 0.005];
         Ok(shares.map(|s| vec![s * top]).to_vec())
     },
     limits: |cover, place, _| {

@@ -11,7 +11,7 @@ use super::campaign::EstimatorKind;
 use super::candidates::CandidateSection;
 use super::held_out::{HeldOut, TorqueExcesses};
 use super::limits::Limits;
-use super::robot_file::{FrictionLawKind, ModelKind, RobotFile};
+use super::robot_file::{ModelKind, RobotFile};
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::verdict::IDENTIFIED;
 pub use cft_ident_core::verdict::Verdict;
@@ -327,12 +327,6 @@ impl ModelFile {
         needed
             .map(|info| Ok(self.parameter(file, &info.name, None)?.in_use()))
             .collect()
-    }
-
-    /// Whether the file has every parameter of a friction law at a joint.
-    pub fn has_law(&self, law: FrictionLawKind, joint: &str) -> bool {
-        let mut names = law.names().iter();
-        names.all(|name| self.find(name, Some(joint)).is_some())
     }
 
     /// Double-tanh friction of one joint, eq. (18).

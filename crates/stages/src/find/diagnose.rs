@@ -218,6 +218,7 @@ pub fn diagnose(
     };
     let own = OwnFit::of(
         (settings.model, &before),
+        &case.given.model.friction,
         &in_memory.inputs[..data.logs.len()],
         (settings.keep, settings.hold_friction),
     );

@@ -19,7 +19,6 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::identified::friction_unit;
 use cft_ident_files::config::model_file::FrictionPrior;
-use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::Provenance;
 
 /// The friction of a joint before and after a fit.
@@ -257,7 +256,7 @@ pub(crate) fn before_these(
     let mut priors = Vec::new();
     let joints = file.robot.joint_names().into_iter();
     // by what the model holds: a robot file may name another law than the friction that was given to its fit has
-    for joint in joints.filter(|joint| file.has_law(FrictionLawKind::DoubleTanh, joint)) {
+    for joint in joints.filter(|joint| file.double_tanh(name, joint).is_ok()) {
         let prior = prior_of((name, file), &joint, given)?;
         let keys = DoubleTanh::NAMES.map(|key| format!("{key}:{joint}"));
         let changed = file.double_tanh(name, &joint)?.parameters();

@@ -16,7 +16,9 @@ use crate::input::unknown_key::key_of;
 use cft_ident_core::diagnose::{ModelProposal, Unknown, value_of};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
+use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::Provenance;
 
 /// How the declared numbers of a proposal are fitted.
@@ -42,10 +44,11 @@ pub(crate) struct OwnFit {
 }
 
 impl OwnFit {
-    /// The fit of the logs `inputs` that made the given model, where one did; `before` is the model with the friction
-    /// that is known without them.
+    /// The fit of the logs `inputs` that made the given model, where one did: its friction, joint by joint `laws`, is
+    /// then of the law that was fitted. `before` is the model with the friction that is known without them.
     pub fn of(
         (given, before): (&GivenModel, &ModelFile),
+        laws: &[JointFriction],
         inputs: &[Provenance],
         (keep, hold_friction): (bool, bool),
     ) -> Option<Self> {
@@ -58,10 +61,16 @@ impl OwnFit {
             && inputs.iter().all(|b| fitted.iter().any(|a| same(a, b)));
         let known = !given.file.friction_prior.is_empty();
         // friction that was not known before is of the law that the robot file names
-        let law = given.file.robot.friction_law();
-        let joints = given.file.robot.joint_names();
-        let of_law = known || joints.iter().all(|joint| given.file.has_law(law, joint));
-        let by_lsq = made.command == "lsq" && made.estimator.is_none() && of_law;
+        let fitted_law = match known {
+            true => FrictionLawKind::DoubleTanh,
+            false => given.file.robot.friction_law(),
+        };
+        let of_law = |law: &JointFriction| match law {
+            JointFriction::None => true,
+            JointFriction::DoubleTanh(_) => fitted_law == FrictionLawKind::DoubleTanh,
+            JointFriction::ViscousCoulomb(_) => fitted_law == FrictionLawKind::ViscousCoulomb,
+        };
+        let by_lsq = made.command == "lsq" && made.estimator.is_none() && laws.iter().all(of_law);
         (by_these && by_lsq && !keep).then(|| OwnFit {
             friction: known.then(|| GivenModel {
                 file: before.clone(),
