@@ -47,7 +47,8 @@ pub struct Numbers {
     /// many joints get worse; six: a tenth of the gain is lost.
     pub deviations: f64,
     /// The same of a shape that the declared law leaves open and no machine lacks: one question to a joint, and not one of
-    /// some hundred. Five: on measured logs a twelfth of the whole gain is lost.
+    /// some hundred. Half: of measured logs half as many joints again get worse, one of them by a fifth; five: a twelfth of
+    /// the gain is lost.
     pub declared_deviations: f64,
     /// A block is at least so many 1/e times of the residual long. Half: neighbours share their noise; five: the logs
     /// of a robot that lacks an effect give a handful of blocks.
