@@ -48,8 +48,8 @@ impl<'a> Field<'a> {
     /// The numbers by which an effect is judged.
     pub fn numbers_of(&self, effect: &ModelEffect) -> Numbers {
         let numbers = self.numbers();
-        match effect.law.entry.declared {
-            true => numbers.of_declared(),
+        match effect.law.entry.expected {
+            true => numbers.of_expected(),
             false => *numbers,
         }
     }

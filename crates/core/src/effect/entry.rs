@@ -209,8 +209,8 @@ pub struct Entry {
     pub at_rest: bool,
     /// Whether it is friction: with all other friction of its joints it takes power.
     pub friction: bool,
-    /// Whether it is a shape that the declared law leaves open, which every machine has.
-    pub declared: bool,
+    /// Whether every machine is expected to have it: a shape that the declared law leaves open.
+    pub expected: bool,
     /// Whether a person can measure its size: it is known or it is not, and never taken in part.
     pub measurable: bool,
     /// What its numbers must satisfy to bear its name.
@@ -244,7 +244,7 @@ impl Entry {
         search: ShapeSearch::Linear,
         at_rest: false,
         friction: false,
-        declared: false,
+        expected: false,
         measurable: false,
         must: &[],
         otherwise: None,

@@ -33,7 +33,8 @@ pub static ENTRY: Entry = Entry {
     ..Entry::USUAL
 };
 
-/// How near to 1 a power is told from it: half of it doubles the two numbers that cancel, twice of it misses bends between.
+/// How near to 1 a power may come: there it bends beside viscous friction as v ln v does, to a thousandth, and its size and
+/// the viscous friction, which cancel, are twenty times the bend.
 const BESIDE_VISCOUS: f64 = 0.05;
 
 pub static LAW: Law = Law {

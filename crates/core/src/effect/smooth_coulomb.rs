@@ -17,7 +17,7 @@ pub static ENTRY: Entry = Entry {
     ],
     search: ShapeSearch::Refined,
     friction: true,
-    declared: true,
+    expected: true,
     must: &[
         Rule::not_negative("fc", "friction acts against the motion"),
         Rule::at_most(

@@ -46,10 +46,10 @@ pub struct Numbers {
     /// An amplitude is written from so many of its deviations on, s = max(0, 1 - deviations^2 / F). Four: three times as
     /// many joints get worse; six: a tenth of the gain is lost.
     pub deviations: f64,
-    /// The same of a shape that the declared law leaves open and no machine lacks: one question to a joint, and not one of
-    /// some hundred. Half: of measured logs half as many joints again get worse, one of them by a fifth; five: a twelfth of
+    /// The same of an effect that every machine is expected to have: one question to a joint, and not one of some
+    /// hundred. Half: of measured logs half as many joints again get worse, one of them by a fifth; five: a twelfth of
     /// the gain is lost.
-    pub declared_deviations: f64,
+    pub expected_deviations: f64,
     /// A block is at least so many 1/e times of the residual long. Half: neighbours share their noise; five: the logs
     /// of a robot that lacks an effect give a handful of blocks.
     pub memory_times: f64,
@@ -71,10 +71,10 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// The numbers by which a shape is judged that the declared law leaves open.
-    pub fn of_declared(&self) -> Self {
+    /// The numbers by which an effect is judged that every machine is expected to have.
+    pub fn of_expected(&self) -> Self {
         Numbers {
-            deviations: self.declared_deviations,
+            deviations: self.expected_deviations,
             ..*self
         }
     }
@@ -86,7 +86,7 @@ pub const NUMBERS: Numbers = Numbers {
     blocks: 24,
     least_blocks: 8,
     deviations: 5.0,
-    declared_deviations: 3.0,
+    expected_deviations: 3.0,
     memory_times: 1.0,
     noticeable: 0.02,
     noticeable_torque: 1e-3,

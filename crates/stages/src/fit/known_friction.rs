@@ -14,11 +14,13 @@ use cft_ident_core::friction::estimate::curve_std;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::solve::Fit;
 use cft_ident_core::robot::friction::DoubleTanh;
+use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::verdict::{Verdict, WEAK, verdict_of};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::identified::friction_unit;
 use cft_ident_files::config::model_file::FrictionPrior;
+use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::Provenance;
 
 /// The friction of a joint before and after a fit.
@@ -254,9 +256,13 @@ pub(crate) fn before_these(
 ) -> Result<(ModelFile, Vec<FrictionPrior>), IdentifyError> {
     let mut model = file.clone();
     let mut priors = Vec::new();
-    let joints = file.robot.joint_names().into_iter();
-    // by what the model holds: a robot file may name another law than the friction that was given to its fit has
-    for joint in joints.filter(|joint| file.double_tanh(name, joint).is_ok()) {
+    let declared = file.robot.friction_law() == FrictionLawKind::DoubleTanh;
+    for joint in file.robot.joint_names() {
+        // a robot file may name another law than the friction has that was given to the model's fit
+        let holds = file.joint_friction(name, &joint)?;
+        if !declared && !matches!(holds, JointFriction::DoubleTanh(_)) {
+            continue;
+        }
         let prior = prior_of((name, file), &joint, given)?;
         let keys = DoubleTanh::NAMES.map(|key| format!("{key}:{joint}"));
         let changed = file.double_tanh(name, &joint)?.parameters();
