@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut sources = Vec::new();
     for (file, log) in logs.iter().enumerate() {
         let reduced = reduce(
-            &Dataset::new(&machine, &[Log::File(log.parse()?)]),
+            &Dataset::read(&machine, &[Log::File(log.parse()?)], &Control::default())?,
             None,
             &control,
         )?;

@@ -23,7 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let held_out = [Log::File(format!("{log}@70..100%").parse()?)];
 
     // signs, units and zeros of the robot file against the torques
-    let data = Dataset::new(&arm, &fitted).with_held_out(&held_out);
+    let data = Dataset::read(&arm, &fitted, &Control::default())?
+        .holding_out(&held_out, &Control::default())?;
     let setup = check_setup(&data, &control)?;
     for finding in setup.report.refusals() {
         eprintln!("{robot}: {}", finding.in_words());
@@ -35,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let fit = lsq(&data, &settings, &control)?;
     let model = GivenModel::new("model", fit.model(&arm, None));
-    let unseen = Dataset::new(&arm, &held_out);
+    let unseen = Dataset::read(&arm, &held_out, &Control::default())?;
     let settings = ValidateSettings::of(&model);
     let judged = validate(&unseen, &settings, &control, &mut |_, _| {})?;
     for joint in &judged.validation.errors.joints {

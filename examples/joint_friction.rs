@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
 
     let found = friction(
-        &Dataset::new(&machine, &logs),
+        &Dataset::read(&machine, &logs, &Control::default())?,
         &FrictionSettings::default(),
         &Control::default(),
     )?;

@@ -20,7 +20,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("give MODEL.toml LOG".into());
     };
     let empty = GivenModel::new(name, ModelFile::load(Path::new(name))?);
-    let data = Dataset::new(&empty.machine(), &[Log::File(log.parse()?)]);
+    let data = Dataset::read(
+        &empty.machine(),
+        &[Log::File(log.parse()?)],
+        &Control::default(),
+    )?;
 
     let found = payload(&data, &empty, &Control::default())?;
     for reading in &found.readings {

@@ -42,7 +42,7 @@
 //! # }
 //! // t [s], q [rad] and tau [Nm] are slices, row after row; Log::from takes a file instead
 //! let log = Log::of_rows("monday", &t, &q, &tau)?;
-//! let found = lsq(&Dataset::new(&arm, &[log]), &LsqSettings::default(), &Control::default())?;
+//! let found = lsq(&Dataset::read(&arm, &[log], &Control::default())?, &LsqSettings::default(), &Control::default())?;
 //! for u in &found.unknowns {
 //!     println!("{} = {:.3} +- {:.3} {}", u.key, u.fitted, u.fitted_std, u.unit);
 //! }

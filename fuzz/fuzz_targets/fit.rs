@@ -37,7 +37,9 @@ fuzz_target!(|data: &[u8]| {
     };
     let machine = LoggedRobot::new("r.toml", robot.clone());
     let control = Control::default();
-    let data = Dataset::new(&machine, std::slice::from_ref(&log));
+    let Ok(data) = Dataset::read(&machine, std::slice::from_ref(&log), &Control::default()) else {
+        return;
+    };
     let Ok(found) = lsq(&data, &LsqSettings::default(), &control) else {
         return;
     };

@@ -24,7 +24,7 @@ fn real() -> &'static (LoggedRobot, Vec<u8>) {
         let q: Vec<f64> = t.iter().map(|t| (3.0 * t).sin() + 0.2 * (17.0 * t).sin()).collect();
         let tau: Vec<f64> = t.iter().map(|t| -9.0 * (3.0 * t).sin() + 2.0 * (3.0 * t).cos()).collect();
         let log = Log::of_rows("log", &t, &q, &tau).expect("the log is right");
-        let parts = reduce(&Dataset::new(&machine, &[log]), None, &Control::default()).expect("a motion");
+        let parts = reduce(&Dataset::read(&machine, &[log], &Control::default()).expect("logs that can be read"), None, &Control::default()).expect("a motion");
         let bytes = parts.to_bytes().expect("a part");
         (machine, bytes)
     })
@@ -56,5 +56,5 @@ fuzz_target!(|data: &[u8]| {
     let again = parts.to_bytes().expect("what is read is written");
     let read = ReducedLogs::from_bytes("part.cfi", &again).expect("what is written is read");
     assert_eq!(read.to_bytes().expect("once more"), again);
-    let _ = lsq(&Dataset::new(machine, &parts.as_logs()), &LsqSettings::default(), &Control::default());
+    let _ = lsq(&Dataset::read(machine, &parts.as_logs(), &Control::default()).expect("logs that can be read"), &LsqSettings::default(), &Control::default());
 });

@@ -85,7 +85,7 @@ pub fn friction(
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
     let old = model.map(|m| m.given.file.clone());
     work::run(py, move |control, _| {
-        let setup = accepted(Dataset::new(&machine, &logs), control)?;
+        let setup = accepted(Dataset::read(&machine, &logs, control).map_err(of_stage)?, control)?;
         let machine = &setup.data.machine;
         let settings = FrictionSettings { joint };
         let mut found = identify::friction(&setup.data, &settings, control).map_err(of_stage)?;
@@ -151,7 +151,7 @@ pub fn lsq(
                 .belongs_to(&given.name, &machine.file)
                 .map_err(of_input)?;
         }
-        let setup = accepted(Dataset::new(&machine, &logs), control)?;
+        let setup = accepted(Dataset::read(&machine, &logs, control).map_err(of_stage)?, control)?;
         let machine = &setup.data.machine;
         let settings = LsqSettings {
             estimator: kind,
@@ -189,7 +189,7 @@ pub fn validate(
     let logs = all(&logs);
     work::run(py, move |control, _| {
         let augmented = given.numbers().map_err(of_stage)?;
-        let data = Dataset::new(&given.machine(), &logs);
+        let data = Dataset::read(&given.machine(), &logs, control).map_err(of_stage)?;
         let settings = ValidateSettings {
             free_run: true,
             ..ValidateSettings::of(&given)
@@ -226,7 +226,8 @@ pub fn diagnose(
     let (train, holdout) = (all(&logs), all(&holdout));
     work::run(py, move |control, _| {
         let (machine, file) = (of.machine(), &of.file);
-        let data = Dataset::new(&machine, &train).with_held_out(&holdout);
+        let data = Dataset::read(&machine, &train, control).map_err(of_stage)?;
+        let data = data.holding_out(&holdout, control).map_err(of_stage)?;
         let settings = DiagnoseSettings {
             keep,
             ..DiagnoseSettings::of(&of)
@@ -272,7 +273,7 @@ pub fn reduce(
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
     let friction = model.map(|m| m.given.clone());
     work::run(py, move |control, _| {
-        let data = accepted(Dataset::new(&machine, &logs), control)?.data;
+        let data = accepted(Dataset::read(&machine, &logs, control).map_err(of_stage)?, control)?.data;
         let found = identify::reduce(&data, friction.as_ref(), control).map_err(of_stage)?;
         Ok(Part {
             logs: Arc::new(found),

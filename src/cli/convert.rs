@@ -10,7 +10,8 @@ use super::{
 };
 use cft_ident_core::number;
 use cft_ident_logs::log::{
-    Block, Instant, LogSection, LogSpec, Provenance, RawBlock, RawReader, Reader, escape,
+    Block, Instant, JointTemperatures, Layout, LogSection, LogSpec, Provenance, RawBlock,
+    RawReader, Reader, escape,
 };
 use cft_ident_logs::output::{LogForm, LogWriter};
 use cft_ident_report::report::json::JsonDocument;
@@ -212,7 +213,10 @@ fn of_robot(
         context.check()?;
         let origin = reader.origin();
         if courses.is_none() {
-            courses = Some(machine.temperatures(&spec.into(), origin)?);
+            let read = |(joints, layout): (Vec<usize>, Layout)| {
+                JointTemperatures::read(spec, (&joints, &layout), origin)
+            };
+            courses = machine.file.temperature_layout().map(read).transpose()?;
         }
         for (k, t) in block.t.iter().enumerate() {
             let parts = [&block.q, &block.tau, &block.dq].map(|x| x.get(k * n..(k + 1) * n));

@@ -81,8 +81,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if args.as_declared {
         machine = machine.as_declared();
     }
-    let data = Dataset::new(&machine, &logs_of(&args.leave_out.of(&args.logs)))
-        .with_held_out(&logs_of(&args.holdout));
     let own = args.candidates.as_deref();
     let own = own.map(files::candidates).transpose()?;
     let settings = DiagnoseSettings {
@@ -97,6 +95,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     // before the logs are looked at
     settings.check_candidates(&machine)?;
+    let data = Dataset::read(
+        &machine,
+        &logs_of(&args.leave_out.of(&args.logs)),
+        &context.control,
+    )?
+    .holding_out(&logs_of(&args.holdout), &context.control)?;
     let report = setup::report(&data, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
     if let Some(fault) = fault.as_ref().filter(|_| !args.as_declared) {

@@ -30,7 +30,7 @@ use cft_ident_files::config::{
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::table::{CellAlignment, Table};
-use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, InMemory};
+use cft_ident_stages::identify::{self, BANDWIDTH_HZ, GivenModel, InMemory, LogData};
 use cft_ident_tool::held::gravity_in_python;
 use cft_ident_tool::tool::{RobotController, ToolFile};
 
@@ -235,7 +235,8 @@ fn along(args: &Args, given: &GivenModel, context: &Context) -> Result<Option<In
     if args.logs.is_empty() {
         return Ok(None);
     }
-    let (machine, logs) = (given.machine(), logs_of(&args.logs));
+    let machine = given.machine();
+    let logs = LogData::read_all(&machine, &logs_of(&args.logs), &[], &context.control)?;
     let whole = identify::read_whole(&machine, &logs, &context.control)?;
     machine.check_temperatures(&given.numbers()?, &logs, &whole.stretches)?;
     Ok(Some(whole))

@@ -67,7 +67,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let settings = FrictionSettings {
         joint: args.joint.clone(),
     };
-    let data = Dataset::new(&machine, &logs_of(&args.logs));
+    let data = Dataset::read(&machine, &logs_of(&args.logs), &context.control)?;
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
     let machine = &checked.setup.data.machine;

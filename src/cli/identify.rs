@@ -22,7 +22,7 @@ use cft_ident_report::report::stages;
 use cft_ident_report::report::stages::identify::ShownLogs;
 use cft_ident_stages::identify::{
     self, Dataset, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction,
-    IdentifySettings, LoggedRobot, StageEnd, Validated,
+    IdentifySettings, Log, LogData, LoggedRobot, StageEnd, Validated,
 };
 use cft_ident_stages::replay::ReplayedDiagnosis;
 use cft_ident_stages::setup::Finding;
@@ -194,7 +194,7 @@ impl IdentifyJob {
                 LoggedRobot::new(&robot.to_string_lossy(), found.file)
             }
         };
-        machine.check_moving(&logs_of(all), &context.control)?;
+        identify::check_moving(&Dataset::read(&machine, &logs_of(all), &context.control)?.logs)?;
         let logs = held_out::parted(all);
         if logs.validation.is_empty() {
             let text =
@@ -277,7 +277,7 @@ fn execute(
     }
     let stages = context.stages(&STAGES);
     stages.begin("set-up");
-    let data = Dataset::new(&work.machine, &logs_of(&training));
+    let data = Dataset::read(&work.machine, &logs_of(&training), &context.control)?;
     let checked = setup::checked(data, (&work.robot, &[]), &with_draft, context)?;
     warnings.extend(checked.setup.notes.iter().map(ToString::to_string));
     match (work.draft, &checked.new_file) {
@@ -293,10 +293,14 @@ fn execute(
     if let Some(text) = work.shipped {
         out.write("robot.toml", text)?;
     }
-    let machine = checked.setup.data.machine;
+    let known = checked.setup.data;
+    let machine = known.machine.clone();
+    let read = |logs: &[Log]| LogData::read_all(&machine, logs, &[&known.logs], &context.control);
     let data = Dataset {
-        one_joint: of_friction,
-        ..Dataset::new(&machine, &fitted_logs).with_held_out(&logs_of(&unseen))
+        machine: machine.clone(),
+        logs: read(&fitted_logs)?,
+        one_joint: read(&of_friction)?,
+        held_out: read(&logs_of(&unseen))?,
     };
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,

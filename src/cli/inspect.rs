@@ -18,7 +18,7 @@ use cft_ident_logs::log::{
 use cft_ident_report::report::ReportDetail;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{Dataset, IdentifyError, LoggedRobot, repeated_rows};
+use cft_ident_stages::identify::{Dataset, IdentifyError, LogData, LoggedRobot, repeated_rows};
 use cft_ident_stages::setup::{Finding, SetupReport};
 
 const EXAMPLE: &str = "\
@@ -165,7 +165,8 @@ fn compare(
     let n = joints.len();
     let mut comparison = OrderComparison::new(n);
     let changes = comparison.changes().to_vec();
-    let mut log = machine.open(&spec.into(), &context.control)?;
+    let log = LogData::read(machine, &spec.into(), &context.control)?;
+    let mut log = log.open(&context.control)?;
     let summary = motion::run(
         &mut |block| log.read(block),
         n,
@@ -310,7 +311,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         model: None,
     }) = &known
     {
-        report = setup::report(&Dataset::new(machine, &logs_of(&args.logs)), context)?;
+        // of logs that cannot be read the findings say why
+        report = match Dataset::read(machine, &logs_of(&args.logs), &context.control) {
+            Ok(data) => setup::report(&data, context)?,
+            Err(_) => SetupReport::default(),
+        };
+        context.check()?;
     }
     let mut text = stages::inspect::inspect(&logs, &report.findings);
     stages::setup::section(&mut text.everywhere(), &report);

@@ -91,17 +91,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let friction = files::friction("lsq", args.model.as_deref(), &machine.file, context)?;
     given.extend(friction.iter().map(|model| model.provenance.clone()));
     let known = friction.as_ref().map(|model| &model.value);
-    let data = Dataset::new(&machine, &logs(&args.leave_out.of(&args.logs))?);
-    machine.check_moving(&data.logs, &context.control)?;
+    let data = Dataset::read(
+        &machine,
+        &logs(&args.leave_out.of(&args.logs))?,
+        &context.control,
+    )?;
+    identify::check_moving(&data.logs)?;
     let (data, gains, edits) = match &args.fit_gains {
         None => (data, None, Vec::new()),
         Some(payload) => {
             let payload = payload.as_ref().map(KnownPayload::known);
             let fitted = identify::fit_gains(&data, payload.as_ref(), &context.control)?;
-            let data = Dataset {
-                machine: fitted.machine,
-                ..data
-            };
+            let data = fitted.data(&data, &context.control)?;
             (data, Some(fitted.gains), fitted.edits)
         }
     };

@@ -5,13 +5,13 @@ use cft_ident_core::effect::AugmentedModel;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::sections::quality::InspectedLog;
-use cft_ident_stages::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
+use cft_ident_stages::identify::{self, IdentifyError, InMemory, LogData, LoggedRobot};
 use cft_ident_stages::replay::{LogReplay, ReplayedLogs};
 
 /// Reads logs whole for the pictures of a report; none where they are too long for that.
 pub(super) fn in_memory(
     machine: &LoggedRobot,
-    logs: &[Log],
+    logs: &[LogData],
     context: &Context,
 ) -> Result<Option<InMemory>, CliError> {
     match identify::read_whole(machine, logs, &context.control) {

@@ -84,7 +84,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let machine = LoggedRobot::new(&args.robot, robot.value);
     let friction = files::friction("reduce", args.model.as_deref(), &machine.file, context)?;
     let known = friction.as_ref().map(|model| &model.value);
-    let data = Dataset::new(&machine, &logs(&args.logs)?);
+    let data = Dataset::read(&machine, &logs(&args.logs)?, &context.control)?;
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
     let setup = &checked.setup;

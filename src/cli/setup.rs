@@ -88,7 +88,7 @@ fn put_right(
     let text = new_text(robot, &edits, corrected, path)?;
     let corrected = corrected.clone();
     Ok(CheckedDataset {
-        setup: found.put_right(&path.to_string_lossy(), corrected),
+        setup: found.put_right(&path.to_string_lossy(), corrected, &context.control)?,
         new_file: Some((path.clone(), text)),
     })
 }

@@ -140,19 +140,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         open_loop: args.open_loop,
         ..ValidateSettings::of(&given.value)
     };
-    let found = identify::validate(
-        &Dataset::new(&machine, &logs),
-        &settings,
-        &context.control,
-        &mut |r, origin| {
-            if let Some(file) = &mut residual
-                && failed.is_none()
-            {
-                file.set_origin(origin);
-                failed = file.row(residual_row(r, band)).err();
-            }
-        },
-    )?;
+    let data = Dataset::read(&machine, &logs, &context.control)?;
+    let found = identify::validate(&data, &settings, &context.control, &mut |r, origin| {
+        if let Some(file) = &mut residual
+            && failed.is_none()
+        {
+            file.set_origin(origin);
+            failed = file.row(residual_row(r, band)).err();
+        }
+    })?;
     if let Some(error) = failed {
         return Err(error.into());
     }
@@ -185,8 +181,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     if args.report.is_some() {
         // pictures are of the rows that the numbers are of
-        let smoothed = machine.smoothed_for(&logs, &model, &context.control)?;
-        let in_memory = pictures::in_memory(&smoothed, &logs, context)?;
+        let smoothed = machine.smoothed_for(&data.logs, &model, &context.control)?;
+        let in_memory = pictures::in_memory(&smoothed, &data.logs, context)?;
         let used = match found.by_use {
             Some(_) => identify::used_for(file, &found.inputs),
             None => Vec::new(),

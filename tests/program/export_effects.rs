@@ -10,7 +10,7 @@ use cft_ident::effect::formula::{FormulaDefinition, FormulaShape};
 use cft_ident::effect::own;
 use cft_ident::effect::{self, AugmentedModel, EffectPlace, FAULTS, LAWS, Law, ModelEffect};
 use cft_ident::export::{self, Program};
-use cft_ident::identify::{Control, Log, LoggedRobot, read_whole};
+use cft_ident::identify::{Control, Log, LogData, LoggedRobot, read_whole};
 use cft_ident::robot::Robot;
 use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::model::JointFriction;
@@ -230,7 +230,9 @@ fn measured(config: &str, log: &str, effects: &dyn Fn(&Robot) -> Vec<ModelEffect
             .parse::<cft_ident::log::LogSpec>()
             .unwrap(),
     );
-    let whole = read_whole(&machine, &[log], &Control::default()).unwrap();
+    let control = Control::default();
+    let log = LogData::read(&machine, &log, &control).unwrap();
+    let whole = read_whole(&machine, &[log], &control).unwrap();
     let each = whole.stretches.into_iter().map(|along| Case {
         name: path.display().to_string(),
         model: AugmentedModel {

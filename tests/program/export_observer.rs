@@ -153,7 +153,7 @@ fn compiled_observers_give_the_lines_of_watch_and_models_without_held_out_data_g
     let machine = LoggedRobot::load("configs/ur10.toml").unwrap();
     let logs = [log("fitted", fitted)];
     let found = lsq(
-        &Dataset::new(&machine, &logs),
+        &Dataset::read(&machine, &logs, &Control::default()).unwrap(),
         &LsqSettings::default(),
         &Control::default(),
     )

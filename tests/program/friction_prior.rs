@@ -106,7 +106,7 @@ fn with(
         ..LsqSettings::default()
     };
     lsq(
-        &Dataset::new(&machine(), &[log(seed)]),
+        &Dataset::read(&machine(), &[log(seed)], &Control::default()).unwrap(),
         &settings,
         &Control::default(),
     )

@@ -63,7 +63,7 @@ fn the_deviation_of_the_mass_is_that_of_all_gains() {
             std: std * payload.mass,
         };
         fit_gains(
-            &Dataset::new(&machine(None), &empty),
+            &Dataset::read(&machine(None), &empty, &Control::default()).unwrap(),
             Some(&known),
             &Control::default(),
         )
@@ -83,7 +83,7 @@ fn ratios_of_gains_show_without_a_payload_and_leave_the_model_in_amperes() {
     let (gains, _) = logs(folder.path(), 7, 0.002);
     let empty = [of(folder.path(), "empty.csv")];
     let found = fit_gains(
-        &Dataset::new(&machine(None), &empty),
+        &Dataset::read(&machine(None), &empty, &Control::default()).unwrap(),
         None,
         &Control::default(),
     )
@@ -100,7 +100,7 @@ fn ratios_of_gains_show_without_a_payload_and_leave_the_model_in_amperes() {
         ..LsqSettings::default()
     };
     let fit = lsq(
-        &Dataset::new(&found.machine, &empty),
+        &Dataset::read(&found.machine, &empty, &Control::default()).unwrap(),
         &settings,
         &Control::default(),
     )
@@ -127,7 +127,7 @@ fn a_log_that_carries_no_load_and_exchanged_logs_are_reported() {
         let empty = [of(folder.path(), empty)];
         gain_error(
             fit_gains(
-                &Dataset::new(&machine(None), &empty),
+                &Dataset::read(&machine(None), &empty, &Control::default()).unwrap(),
                 Some(&known),
                 &Control::default(),
             )
@@ -162,7 +162,7 @@ fn a_joint_whose_channel_has_the_other_sign_is_named() {
     let empty = [of(folder.path(), "empty.csv")];
     let turned = LoggedRobot::new("arm.toml", file);
     let error = fit_gains(
-        &Dataset::new(&turned, &empty),
+        &Dataset::read(&turned, &empty, &Control::default()).unwrap(),
         Some(&known),
         &Control::default(),
     )
@@ -324,7 +324,7 @@ fn a_turn_about_the_vertical_shows_no_mass() {
     let empty = [of(folder.path(), "empty.csv")];
     let turn = LoggedRobot::new("turn.toml", file);
     let error = fit_gains(
-        &Dataset::new(&turn, &empty),
+        &Dataset::read(&turn, &empty, &Control::default()).unwrap(),
         Some(&known),
         &Control::default(),
     )

@@ -37,6 +37,7 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     ("validate", "math robot block motion verdict"),
     ("inspect", "math number block log"),
+    ("recording", "robot block log motion inspect"),
     ("setup", "math number robot motion inertia judge"),
     ("mapping", "explain robot log inspect"),
     ("simulate", "explain math number robot log config effect"),
@@ -55,7 +56,7 @@ const ROOMS: &[(&str, &str)] = &[
     (
         "input",
         "note explain math block verdict number robot log config motion effect friction inertia judge diagnose validate \
-         inspect setup open_loop track",
+         inspect recording setup open_loop track",
     ),
     (
         "held_out",
@@ -65,7 +66,7 @@ const ROOMS: &[(&str, &str)] = &[
     (
         "fit",
         "note input held_out explain math block verdict number robot log config motion effect friction inertia \
-         judge diagnose validate inspect setup band open_loop",
+         judge diagnose validate inspect recording setup band open_loop",
     ),
     (
         "find",

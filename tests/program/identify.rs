@@ -44,12 +44,9 @@ fn motion() -> [Vec<f64>; 3] {
 }
 
 fn fitted(log: Log) -> Result<IdentifiedDynamics, Box<IdentifyError>> {
-    lsq(
-        &Dataset::new(&robot(), &[log]),
-        &LsqSettings::default(),
-        &Control::default(),
-    )
-    .map_err(Box::new)
+    let control = Control::default();
+    let data = Dataset::read(&robot(), &[log], &control).map_err(Box::new)?;
+    lsq(&data, &LsqSettings::default(), &control).map_err(Box::new)
 }
 
 #[test]
@@ -85,14 +82,14 @@ fn a_model_that_was_fitted_is_validated_without_a_file() {
     let log = [Log::of_rows("screw", &t, &q, &tau).unwrap()];
     let control = Control::default();
     let found = lsq(
-        &Dataset::new(&robot, &log),
+        &Dataset::read(&robot, &log, &Control::default()).unwrap(),
         &LsqSettings::default(),
         &control,
     )
     .unwrap();
     let model = GivenModel::new("model", found.model(&robot, None));
     let mut rows = 0;
-    let data = Dataset::new(&robot, &log);
+    let data = Dataset::read(&robot, &log, &Control::default()).unwrap();
     let settings = ValidateSettings::of(&model);
     let validated = validate(&data, &settings, &control, &mut |_, _| rows += 1).unwrap();
     assert!(validated.validation.errors.joints[0].relative_error < 0.01);
@@ -109,14 +106,17 @@ fn fitted_logs_do_not_lend_their_error_to_unseen_ones() {
     let (robot, control) = (robot(), Control::default());
     let settings = LsqSettings::default();
     let found = lsq(
-        &Dataset::new(&robot, std::slice::from_ref(&seen)),
+        &Dataset::read(&robot, std::slice::from_ref(&seen), &Control::default()).unwrap(),
         &settings,
         &control,
     )
     .unwrap();
     let model = GivenModel::new("model", found.model(&robot, None));
     let on = |logs: &[Log]| {
-        let (data, settings) = (Dataset::new(&robot, logs), ValidateSettings::of(&model));
+        let (data, settings) = (
+            Dataset::read(&robot, logs, &Control::default()).unwrap(),
+            ValidateSettings::of(&model),
+        );
         validate(&data, &settings, &control, &mut |_, _| {}).unwrap()
     };
     let alone = [
@@ -155,7 +155,7 @@ fn a_callback_stops_a_stage_and_hears_of_its_progress() {
         }
     });
     lsq(
-        &Dataset::new(&robot(), &log),
+        &Dataset::read(&robot(), &log, &Control::default()).unwrap(),
         &LsqSettings::default(),
         &control,
     )
@@ -166,7 +166,7 @@ fn a_callback_stops_a_stage_and_hears_of_its_progress() {
     );
     let stopped = Control::default().stopped_by(|| true);
     let error = lsq(
-        &Dataset::new(&robot(), &log),
+        &Dataset::read(&robot(), &log, &Control::default()).unwrap(),
         &LsqSettings::default(),
         &stopped,
     )
@@ -184,7 +184,7 @@ fn errors_know_what_they_are_about() {
     let log = Log::of_rows("screw", &t, &wrong, &tau).unwrap();
     assert_eq!(kind(log), ErrorKind::Input);
     let none = lsq(
-        &Dataset::new(&robot(), &[]),
+        &Dataset::read(&robot(), &[], &Control::default()).unwrap(),
         &LsqSettings::default(),
         &Control::default(),
     );
@@ -212,7 +212,7 @@ fn torques_of_a_controller_give_what_a_column_of_them_gives_and_its_faults_are_n
         let file = RobotFile::parse("screw.toml", &text).map_err(|error| error.to_string())?;
         let robot = LoggedRobot::new("screw.toml", file);
         let log: Log = LogSpec::whole(&path).into();
-        let data = Dataset::new(&robot, &[log]);
+        let data = Dataset::read(&robot, &[log], &Control::default()).unwrap();
         lsq(&data, &LsqSettings::default(), &Control::default()).map_err(|error| error.to_string())
     };
     let plain = with(

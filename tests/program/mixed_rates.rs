@@ -61,7 +61,7 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let train = [slide("fast", 1000.0, 1), slide("slow", 400.0, 2)];
     let held_out = [slide("slowest", 250.0, 3)];
     let found = lsq(
-        &Dataset::new(&robot, &train),
+        &Dataset::read(&robot, &train, &Control::default()).unwrap(),
         &LsqSettings::default(),
         &control,
     )
@@ -71,7 +71,10 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let file = found.model(&robot, None);
 
     let given = GivenModel::new("slide.toml", file);
-    let data = Dataset::new(&robot, &train).with_held_out(&held_out);
+    let data = Dataset::read(&robot, &train, &Control::default())
+        .unwrap()
+        .holding_out(&held_out, &Control::default())
+        .unwrap();
     let end = diagnose(&data, &DiagnoseSettings::of(&given), &control).unwrap();
     let DiagnoseEnd::Diagnosed(end) = end else {
         panic!("no fault of the data is there");
@@ -100,7 +103,7 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let apart = |log: &Log| {
         let one = std::slice::from_ref(log);
         let found = validate(
-            &Dataset::new(&robot, one),
+            &Dataset::read(&robot, one, &Control::default()).unwrap(),
             &settings,
             &control,
             &mut |_, _| {},
@@ -109,7 +112,7 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
         found.validation.errors.joints[0].clone()
     };
     let each: Vec<_> = all.iter().map(apart).collect();
-    let data = Dataset::new(&robot, &all);
+    let data = Dataset::read(&robot, &all, &Control::default()).unwrap();
     let together = validate(&data, &settings, &control, &mut |_, _| {}).unwrap();
     let together = &together.validation.errors.joints[0];
     assert_eq!(

@@ -64,18 +64,26 @@ fn jump(v: f64) -> f64 {
 }
 
 fn fitted(machine: &LoggedRobot, logs: &[Log], settings: &LsqSettings) -> IdentifiedDynamics {
-    lsq(&Dataset::new(machine, logs), settings, &Control::default()).unwrap()
+    lsq(
+        &Dataset::read(machine, logs, &Control::default()).unwrap(),
+        settings,
+        &Control::default(),
+    )
+    .unwrap()
 }
 
 fn reduced(machine: &LoggedRobot, logs: &[Log], friction: Option<&ModelFile>) -> ReducedLogs {
     let friction = friction.map(|model| GivenModel::new("friction.toml", model.clone()));
-    let data = Dataset::new(machine, logs);
+    let data = Dataset::read(machine, logs, &Control::default()).unwrap();
     reduce(&data, friction.as_ref(), &Control::default()).unwrap()
 }
 
 fn errors(machine: &LoggedRobot, model: &ModelFile, logs: &[Log]) -> Validated {
     let given = GivenModel::new("model.toml", model.clone());
-    let (data, settings) = (Dataset::new(machine, logs), ValidateSettings::of(&given));
+    let (data, settings) = (
+        Dataset::read(machine, logs, &Control::default()).unwrap(),
+        ValidateSettings::of(&given),
+    );
     validate(&data, &settings, &Control::default(), &mut |_, _| {}).unwrap()
 }
 
@@ -242,7 +250,7 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
             ..LsqSettings::default()
         };
         let error = lsq(
-            &Dataset::new(&machine, &parts),
+            &Dataset::read(&machine, &parts, &Control::default()).unwrap(),
             &settings,
             &Control::default(),
         )

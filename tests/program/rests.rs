@@ -76,7 +76,7 @@ fn rests_do_not_move_the_friction_and_are_distinguished_in_the_errors() {
     let control = Control::default();
     let log = [slide("resting", 1.0, 3)];
     let found = lsq(
-        &Dataset::new(&robot, &log),
+        &Dataset::read(&robot, &log, &Control::default()).unwrap(),
         &LsqSettings::default(),
         &control,
     )
@@ -104,7 +104,7 @@ fn rests_do_not_move_the_friction_and_are_distinguished_in_the_errors() {
 
     let model = GivenModel::new("slide.toml", found.model(&robot, None));
     let unseen = [slide("unseen", 0.6, 8)];
-    let data = Dataset::new(&robot, &unseen);
+    let data = Dataset::read(&robot, &unseen, &Control::default()).unwrap();
     let settings = ValidateSettings::of(&model);
     let all = validate(&data, &settings, &control, &mut |_, _| {}).unwrap();
     let e = &all.validation.errors.joints[0];
@@ -117,7 +117,7 @@ fn rests_do_not_move_the_friction_and_are_distinguished_in_the_errors() {
     let overall = &all.validation.errors.overall;
     assert_eq!(overall.relative_error_moving, e.relative_error_moving);
     assert_eq!(overall.relative_error_rest, e.relative_error_rest);
-    let resting = read_whole(&robot, &unseen, &control).unwrap().rest_speed[0];
+    let resting = read_whole(&robot, &data.logs, &control).unwrap().rest_speed[0];
     assert!((1e-4..1e-2).contains(&resting), "{resting}");
 }
 
@@ -141,7 +141,7 @@ fn a_log_without_rests_has_no_error_at_rest() {
     let log = Log::of_rows("moving", &t, &q, &tau).unwrap();
     let settings = LsqSettings::default();
     let found = lsq(
-        &Dataset::new(&robot(), &[log]),
+        &Dataset::read(&robot(), &[log], &Control::default()).unwrap(),
         &settings,
         &Control::default(),
     )

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use cft_ident::config::RobotFile;
-use cft_ident::identify::{Control, Log, LoggedRobot, read_whole};
+use cft_ident::identify::{Control, Log, LogData, LoggedRobot, read_whole};
 use cft_ident::log::LogSpec;
 use serde_json::Value;
 use serial_arm::{ASKEW, done, run, simulate, write};
@@ -292,7 +292,9 @@ fn a_recording_and_arrays_hold_temperatures_as_a_text_log_does() {
     let arrays = log.clone().with_temperature(0, &column(3)).unwrap();
     let file = Log::from(LogSpec::whole(at.join("id.csv")));
     let of = |log: &Log| {
-        let read = read_whole(&machine, std::slice::from_ref(log), &Control::default()).unwrap();
+        let control = Control::default();
+        let log = LogData::read(&machine, log, &control).unwrap();
+        let read = read_whole(&machine, &[log], &control).unwrap();
         let stretch = &read.stretches[0];
         assert!(stretch.temperature.iter().all(|x| x.len() == stretch.len()));
         stretch.temperature.clone()

@@ -47,7 +47,7 @@ fn sources(name: &str, logs: &[Log]) -> RobotSources {
     let machine = slide();
     let of = |(file, log): (usize, &Log)| {
         let parts = reduce(
-            &Dataset::new(&machine, std::slice::from_ref(log)),
+            &Dataset::read(&machine, std::slice::from_ref(log), &Control::default()).unwrap(),
             None,
             &Control::default(),
         )

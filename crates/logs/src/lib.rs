@@ -28,3 +28,4 @@ pub mod inspect;
 pub mod log;
 pub mod mapping;
 pub mod output;
+pub mod recording;

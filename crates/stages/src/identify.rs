@@ -71,6 +71,7 @@ pub use crate::input::gain_error::GainError;
 pub use crate::input::in_memory::{InMemory, read_whole};
 pub use crate::input::in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use crate::input::log::Log;
+pub use crate::input::log_data::{LogData, check_moving};
 pub use crate::input::logged_robot::{LoggedRobot, narrowed};
 pub use crate::input::model::{new_model, refined, refined_or_friction};
 pub use crate::input::open_log::OpenLog;

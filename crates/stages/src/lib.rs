@@ -24,7 +24,7 @@
 //! };
 //! let tau: Vec<f64> = t.iter().map(force).collect();
 //!
-//! let data = Dataset::new(&robot, &[Log::of_rows("monday", &t, &q, &tau)?]);
+//! let data = Dataset::read(&robot, &[Log::of_rows("monday", &t, &q, &tau)?], &Control::default())?;
 //! let found = lsq(&data, &LsqSettings::default(), &Control::default())?;
 //! assert!((found.unknowns[0].fitted - 3.0).abs() < 0.01);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

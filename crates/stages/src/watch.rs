@@ -12,6 +12,7 @@ use crate::input::dataset::GivenModel;
 use crate::input::error::IdentifyError;
 use crate::input::in_use::levers;
 use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::temperatures;
 use crate::note::{ModelNote, StageNote};
@@ -165,7 +166,10 @@ pub fn watch(
             },
             Vec::new(),
         ),
-        logs => on_other_logs(machine, (file, refined), logs, control)?,
+        logs => {
+            let logs = LogData::read_all(machine, logs, &[], control)?;
+            on_other_logs(machine, (file, refined), &logs, control)?
+        }
     };
     let excesses = learnt(name, &held.joints, held.excesses.as_ref())?;
     let processing = processing(machine, excesses);
@@ -222,7 +226,7 @@ pub fn watch(
         let origin = reader.origin();
         // from the first row on it is known where times are counted from
         if let Some(log) = warm.take_if(|_| !block.is_empty()) {
-            observer.set_temperatures(machine.temperatures_for(refined, &log, origin)?);
+            observer.set_temperatures(machine.temperatures_along(refined, &log, origin)?);
         }
         let pushed = observer.push(&block, !more, &mut |o| {
             over.extend(alarms.take(o));

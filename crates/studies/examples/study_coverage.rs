@@ -151,7 +151,12 @@ fn campaign(seed: u64) -> Value {
 /// Intervals of a fit against the parameters that made its logs.
 fn judged(machine: &LoggedRobot, logs: &[Log], truth: &[f64]) -> Value {
     let (control, settings) = (Control::default(), LsqSettings::default());
-    let parts = reduce(&Dataset::new(machine, logs), None, &control).expect("parts");
+    let parts = reduce(
+        &Dataset::read(machine, logs, &Control::default()).expect("logs that can be read"),
+        None,
+        &control,
+    )
+    .expect("parts");
     let blocks = parts
         .logs()
         .iter()
@@ -159,12 +164,18 @@ fn judged(machine: &LoggedRobot, logs: &[Log], truth: &[f64]) -> Value {
         .max()
         .unwrap_or(0);
     let found = lsq(
-        &Dataset::new(machine, &parts.as_logs()),
+        &Dataset::read(machine, &parts.as_logs(), &Control::default())
+            .expect("logs that can be read"),
         &settings,
         &control,
     )
     .expect("a fit");
-    let of_logs = lsq(&Dataset::new(machine, logs), &settings, &control).expect("a fit");
+    let of_logs = lsq(
+        &Dataset::read(machine, logs, &Control::default()).expect("logs that can be read"),
+        &settings,
+        &control,
+    )
+    .expect("a fit");
     let (mut intervals, mut covered, mut textbook, mut squares, mut apart) =
         (0, 0, 0, 0.0, 0.0_f64);
     for (i, truth) in truth

@@ -20,7 +20,7 @@ use std::path::Path;
 
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, Dataset, Log, LoggedRobot, LsqSettings, PayloadLog, fit_gains, lsq,
+    Control, Dataset, Log, LogData, LoggedRobot, LsqSettings, PayloadLog, fit_gains, lsq,
 };
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::accumulate::BlockFactors;
@@ -71,13 +71,28 @@ fn run(seed: u64) -> Value {
     };
     let control = Control::default();
     let logs = [empty];
-    let fitted = fit_gains(&Dataset::new(&machine, &logs), Some(&known), &control).expect("gains");
-    let ratios = fit_gains(&Dataset::new(&machine, &logs), None, &control).ok();
+    let fitted = fit_gains(
+        &Dataset::read(&machine, &logs, &Control::default()).expect("logs that can be read"),
+        Some(&known),
+        &control,
+    )
+    .expect("gains");
+    let ratios = fit_gains(
+        &Dataset::read(&machine, &logs, &Control::default()).expect("logs that can be read"),
+        None,
+        &control,
+    )
+    .ok();
     let settings = LsqSettings {
         gains: Some(&fitted.gains),
         ..LsqSettings::default()
     };
-    let found = lsq(&Dataset::new(&fitted.machine, &logs), &settings, &control).expect("a fit");
+    let found = lsq(
+        &Dataset::read(&fitted.machine, &logs, &Control::default()).expect("logs that can be read"),
+        &settings,
+        &control,
+    )
+    .expect("a fit");
     let linear = linear(&machine, [&logs[0], &loaded], given_mass, &control);
     fs::remove_dir_all(&folder).expect("the folder is there");
     let gain = |g: &cft_ident::identify::Gain| json!([g.value, g.std]);
@@ -111,7 +126,9 @@ fn linear(machine: &LoggedRobot, logs: [&Log; 2], mass: f64, control: &Control) 
         rest_speed: Vec::new(),
     };
     let read = |log: &Log| -> BlockFactors {
-        let mut open = machine.open(log, control).expect("a log");
+        let mut open = LogData::read(machine, log, control)
+            .and_then(|log| log.open(control))
+            .expect("a log");
         accumulate(robot, &columns, &machine.settings(), &mut |b| open.read(b))
             .expect("rows")
             .0

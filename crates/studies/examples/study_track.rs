@@ -303,11 +303,15 @@ fn whole_way(seed: u64) -> Vec<f64> {
     }
     let control = Control::default();
     let log = Log::of_rows("part", &t, &q, &tau).expect("a log");
-    let part = reduce(&Dataset::new(&machine, &[log]), None, &control)
-        .expect("a part")
-        .as_logs();
+    let part = reduce(
+        &Dataset::read(&machine, &[log], &Control::default()).expect("logs that can be read"),
+        None,
+        &control,
+    )
+    .expect("a part")
+    .as_logs();
     let found = lsq(
-        &Dataset::new(&machine, &part),
+        &Dataset::read(&machine, &part, &Control::default()).expect("logs that can be read"),
         &LsqSettings::default(),
         &control,
     )

@@ -22,6 +22,7 @@ mod look;
 mod order;
 mod position;
 mod shape;
+pub(crate) mod speeds;
 mod together;
 mod unsigned;
 mod verdicts;

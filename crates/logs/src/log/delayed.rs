@@ -168,8 +168,8 @@ impl LogRows for DelayedRows {
         self.inner.place()
     }
 
-    fn clock_remedy(&self, t: f64) -> Option<String> {
-        self.inner.clock_remedy(t)
+    fn clock_remedy(&self) -> Option<String> {
+        self.inner.clock_remedy()
     }
 
     fn warnings(&self) -> Vec<String> {

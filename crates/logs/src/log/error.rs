@@ -7,8 +7,11 @@ use thiserror::Error;
 ///
 /// Files and folders are shown as the user named them; `at` is a file with the line or the message in
 /// it, whose count begins at 1, a `remedy` says what to do.
-#[derive(Debug, Explain, Error)]
+#[derive(Debug, Clone, Explain, Error)]
 pub enum LogError {
+    /// Reading was stopped.
+    #[explain("interrupted")]
+    Interrupted,
     /// A span that makes no sense.
     #[explain(
         "`{spec}`: the span after @ cannot be used: {reason}",
@@ -19,7 +22,7 @@ pub enum LogError {
     #[explain("{file}: cannot be read: {source}", remedy)]
     Read {
         file: String,
-        source: std::io::Error,
+        source: std::sync::Arc<std::io::Error>,
         remedy: String,
     },
     /// The file is of a kind that is not read.

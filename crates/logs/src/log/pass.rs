@@ -4,7 +4,6 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::columns::{time_of, unit_of};
 use super::content::FileContent;
 use super::even::{DeclaredEven, EvenClock};
 use super::layout::Layout;
@@ -13,14 +12,12 @@ use super::rows::{LogRows, RowStrictness, counted};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
 use super::stream::HashedReader;
-use super::tape::{RowTape, TapeRows};
+use super::tape::{RowStore, StoredRows};
 use super::text::{JsonRows, TextRows};
 use super::time::Instant;
-use super::two_clocks::rest_of;
+use super::time_unit::{UNIT_ROWS, first_numbers, is_stated, unstated};
 use super::{LogError, LogSpec, Span};
 
-/// Rows by whose times a unit is recognised.
-const UNIT_ROWS: usize = 1024;
 /// Usual steps from a time of 0 to the next one where the clock began at 0.
 const MAX_STEPS_FROM_ZERO: f64 = 10.0;
 
@@ -51,7 +48,7 @@ pub(super) struct LogPass {
     unstamped: u64,
     watch: Option<HashedReader>,
     /// What is kept of its rows, where it is read strictly.
-    tape: Option<Arc<RowTape>>,
+    store: Option<Arc<RowStore>>,
 }
 
 impl fmt::Debug for LogPass {
@@ -67,35 +64,54 @@ impl LogPass {
         strictness: RowStrictness,
     ) -> Result<Self, LogError> {
         let files = spec.files()?;
-        let mut pass = match (strictness, layout.joints.is_empty()) {
-            (RowStrictness::Refuse, false) => {
-                let tape = spec.kept.tape(&files, layout)?;
-                let found = tape.found.clone().converted_as(layout);
-                let rows = Box::new(TapeRows::new(Arc::clone(&tape)));
-                Self {
-                    files,
-                    tape: Some(tape),
-                    ..Self::of_rows(spec.clone(), rows, found)
-                }
-            }
-            _ => {
-                let opened = open(&files, layout, strictness)?;
-                Self {
-                    files,
-                    strictness,
-                    refused: opened.refused,
-                    ..Self::of_rows(spec.clone(), opened.rows, opened.layout)
-                }
-            }
+        if strictness == RowStrictness::Refuse && !layout.joints.is_empty() {
+            let store = Arc::new(RowStore::read(&files, layout, &|| false)?);
+            return Self::along(spec, &store, layout);
+        }
+        Self::of_files(spec, files, layout, strictness)
+    }
+
+    /// Goes along rows that were parsed, with the conversions of a layout.
+    pub(super) fn along(
+        spec: &LogSpec,
+        store: &Arc<RowStore>,
+        layout: &Layout,
+    ) -> Result<Self, LogError> {
+        let found = store.found().clone().converted_as(layout);
+        let rows = Box::new(StoredRows::new(Arc::clone(store)));
+        Self {
+            files: store.files().to_vec(),
+            time: store.time,
+            recognised: store.recognised.clone(),
+            store: Some(Arc::clone(store)),
+            ..Self::of_rows(spec.clone(), rows, found)
+        }
+        .evenly()
+    }
+
+    fn of_files(
+        spec: &LogSpec,
+        files: Vec<PathBuf>,
+        layout: &Layout,
+        strictness: RowStrictness,
+    ) -> Result<Self, LogError> {
+        let opened = open(&files, layout, strictness)?;
+        let mut pass = Self {
+            files,
+            strictness,
+            refused: opened.refused,
+            ..Self::of_rows(spec.clone(), opened.rows, opened.layout)
         };
         // Who names the column later knows its unit then.
-        let section = &pass.layout.section;
-        let stated = section.time_unit.is_some()
-            || section.rate_hz.is_some()
-            || pass.layout.joints.is_empty();
-        if !stated && let Some(column) = time_of(pass.rows.names(), &pass.layout.time) {
+        if let Some(column) = unstated(&*pass.rows, &pass.layout) {
             pass.recognise(column)?;
         }
+        pass.evenly()
+    }
+
+    /// The same on the even clock of a recording whose rate is given.
+    fn evenly(self) -> Result<Self, LogError> {
+        let mut pass = self;
         if let Some(rate) = pass.layout.section.rate_hz
             && pass.rows.is_recording()
         {
@@ -114,18 +130,10 @@ impl LogPass {
 
     /// Takes the unit of a column of times from its numbers, where its name states none.
     pub(super) fn recognise(&mut self, column: usize) -> Result<(), LogError> {
-        let name = &self.rows.names()[column];
-        let stated = unit_of(name).is_some()
-            || TimeUnit::of_suffix(name).is_some()
-            || rest_of(self.rows.names(), column).is_some();
-        if stated || self.rows.is_recording() {
+        if is_stated(&*self.rows, column) {
             return Ok(());
         }
-        let kept = |tape: &Arc<RowTape>| tape.first_times(column, UNIT_ROWS);
-        let times = match self.tape.as_ref().and_then(kept) {
-            Some(times) => Some(times),
-            None => self.first_numbers(column)?,
-        };
+        let times = first_numbers(&self.files, &self.layout, column)?;
         let Some(times) = times else {
             return Ok(());
         };
@@ -136,19 +144,6 @@ impl LogPass {
             self.recognised = Some((unit, name));
         }
         Ok(())
-    }
-
-    /// The first numbers of a column; none where it holds dates, which have no unit.
-    fn first_numbers(&self, column: usize) -> Result<Option<Vec<f64>>, LogError> {
-        let mut rows = open(&self.files, &self.layout, RowStrictness::Record)?.rows;
-        let mut numbers = Vec::with_capacity(UNIT_ROWS);
-        while numbers.len() < UNIT_ROWS && rows.next()?.is_some() {
-            match rows.logged(column) {
-                Some(number) => numbers.push(number),
-                None => return Ok(None),
-            }
-        }
-        Ok(Some(numbers))
     }
 
     /// What was chosen on the way, one sentence each.
@@ -191,7 +186,7 @@ impl LogPass {
             begun: false,
             unstamped: 0,
             watch: None,
-            tape: None,
+            store: None,
         }
     }
 
@@ -288,8 +283,8 @@ impl LogPass {
 
     /// The rows from the beginning, once more.
     fn again(&self) -> Result<Box<dyn LogRows>, LogError> {
-        match &self.tape {
-            Some(tape) => Ok(Box::new(TapeRows::new(Arc::clone(tape)))),
+        match &self.store {
+            Some(store) => Ok(Box::new(StoredRows::new(Arc::clone(store)))),
             None => self.anew(),
         }
     }

@@ -10,6 +10,7 @@ use super::pass::LogPass;
 use super::rows::{RowStrictness, counted};
 use super::source::{self, Provenance};
 use super::stale::StaleDetector;
+use super::tape::RowStore;
 use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
 use cft_ident_core::number::significant;
@@ -50,6 +51,15 @@ impl Reader {
     /// A file that cannot be read, is no log, or lacks a channel of the layout.
     pub fn open(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
         LogPass::open(spec, layout, RowStrictness::Refuse).map(Self::new)
+    }
+
+    /// Goes along rows that were parsed.
+    pub(crate) fn along(
+        spec: &LogSpec,
+        store: &Arc<RowStore>,
+        layout: &Layout,
+    ) -> Result<Self, LogError> {
+        LogPass::along(spec, store, layout).map(Self::new)
     }
 
     /// Reads a log that is in memory; `layout` names its joints and says whether torques are read.
@@ -269,7 +279,11 @@ impl Reader {
     #[cold]
     fn out_of_order(&mut self, before: f64, t: f64) -> Result<bool, LogError> {
         let rows = &self.pass.rows;
-        let remedy = rows.clock_remedy(before - self.seen.map_or(0.0, |seen| seen.0));
+        let into = before - self.seen.map_or(0.0, |seen| seen.0);
+        let remedy = rows.clock_remedy().map(|remedy| match into > 0.0 {
+            true => format!("{remedy}, or use the part before it: FILE@0..{into}s"),
+            false => remedy,
+        });
         let repeats = t == before && rows.repeats();
         // Nobody can delete messages from a recording by hand.
         if repeats && remedy.is_some() {

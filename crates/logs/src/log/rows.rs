@@ -83,8 +83,8 @@ pub(super) trait LogRows: Send {
         String::new()
     }
 
-    /// What to do about a row that is not later than the one before, `t` s into the log, where nobody can mend it by hand.
-    fn clock_remedy(&self, _t: f64) -> Option<String> {
+    /// What to do about a row that is not later than the one before, where nobody can mend it by hand.
+    fn clock_remedy(&self) -> Option<String> {
         None
     }
 

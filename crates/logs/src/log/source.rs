@@ -2,14 +2,15 @@
 
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::LogError;
-use super::held_files::{OpenFile, opened};
 use super::names::{escape, escape_whole, list, nearest};
+use super::open_file::OpenFile;
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -125,13 +126,13 @@ pub(super) fn shown_all(paths: &[PathBuf]) -> String {
 }
 
 pub(super) fn open(path: &Path) -> Result<OpenFile, LogError> {
-    opened(path).map_err(|error| failed(path, error))
+    OpenFile::open(path).map_err(|error| failed(path, error))
 }
 
 /// Whether a file begins with these bytes; one that cannot be read does not.
 pub fn begins_with(path: &Path, bytes: &[u8]) -> bool {
     let mut first = vec![0; bytes.len()];
-    let read = opened(path).and_then(|mut file| file.read_exact(&mut first));
+    let read = OpenFile::open(path).and_then(|mut file| file.read_exact(&mut first));
     read.is_ok() && first == bytes
 }
 
@@ -176,7 +177,7 @@ pub(super) fn failed(path: &Path, error: io::Error) -> LogError {
     LogError::Read {
         file: shown(path),
         remedy: format!("{}{beside}", remedy(&error)),
-        source: error,
+        source: Arc::new(error),
     }
 }
 

@@ -4,14 +4,12 @@ use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::sync::Arc;
 
 use super::LogError;
 use super::names::escape_whole;
 use super::recording::FORMATS;
 use super::source::{self, failed, file_name, shown};
 use super::table::dataset;
-use super::tape::KeptTapes;
 
 /// The part of a log that is used.
 ///
@@ -111,7 +109,7 @@ impl Span {
 }
 
 /// A log file and the part of it that is used.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LogSpec {
     /// Path as the user wrote it, without the span: a file, a folder with the parts of one
     /// recording, or several files of one recording joined with `+`.
@@ -122,15 +120,6 @@ pub struct LogSpec {
     pub leave_out: Vec<[f64; 2]>,
     /// How long the machine had run when the log began \[s\].
     pub started_s: f64,
-    /// What is kept of it, so that it is read once.
-    pub(super) kept: Arc<KeptTapes>,
-}
-
-impl PartialEq for LogSpec {
-    fn eq(&self, other: &Self) -> bool {
-        let parts = (&self.path, self.span, &self.leave_out);
-        parts == (&other.path, other.span, &other.leave_out)
-    }
 }
 
 impl LogSpec {
@@ -148,13 +137,11 @@ impl LogSpec {
     }
 
     fn new(path: PathBuf, span: Span) -> Self {
-        let kept = KeptTapes::of(&path);
         Self {
             path,
             span,
             leave_out: Vec::new(),
             started_s: 0.0,
-            kept,
         }
     }
 
@@ -183,7 +170,7 @@ impl LogSpec {
         names.join("+")
     }
 
-    /// The bytes of its one file, which is opened once for all who read the log while somebody holds it.
+    /// The bytes of its one file.
     ///
     /// # Errors
     /// A file that cannot be opened.
@@ -192,7 +179,7 @@ impl LogSpec {
     }
 
     /// The files of the log, in order: one file; the recordings in a folder; or `A+B`, joined.
-    pub(super) fn files(&self) -> Result<Vec<PathBuf>, LogError> {
+    pub(crate) fn files(&self) -> Result<Vec<PathBuf>, LogError> {
         if self.path.is_dir() {
             let dataset = dataset(&self.path).map_err(|error| failed(&self.path, error))?;
             return dataset.map_or_else(|| recordings_in(&self.path), Ok);

@@ -2,10 +2,14 @@
 //! arrives on standard input the end of the last line is known.
 
 use std::io::{self, Read};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::held_files::lock;
 use super::source::SourceChecksum;
+
+/// A value behind a lock, whatever became of who held it before.
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A reader; its copies go on where another one has come to.
 #[derive(Clone)]

@@ -1,8 +1,18 @@
 //! The unit of times whose header and robot file state none: by the size of the numbers and of their
 //! steps.
 
-use super::section::TimeUnit;
+use std::path::PathBuf;
 
+use super::LogError;
+use super::columns::{time_of, unit_of};
+use super::layout::Layout;
+use super::open::open;
+use super::rows::{LogRows, RowStrictness};
+use super::section::TimeUnit;
+use super::two_clocks::rest_of;
+
+/// Rows by whose times a unit is recognised.
+pub(super) const UNIT_ROWS: usize = 1024;
 /// Steps of the clocks that logs of robots have [s]: 100 kHz to 1 Hz.
 const STEPS_S: [f64; 2] = [1e-5, 1.0];
 /// A step in the middle of those that are usual [s].
@@ -48,6 +58,41 @@ impl TimeUnit {
         let found = found.min_by(|a, b| off(a).total_cmp(&off(b)));
         found.copied().unwrap_or(Self::Second)
     }
+}
+
+/// The column of times of a robot's log, where its numbers have to say their unit.
+pub(super) fn unstated(rows: &dyn LogRows, layout: &Layout) -> Option<usize> {
+    let section = &layout.section;
+    let stated =
+        section.time_unit.is_some() || section.rate_hz.is_some() || layout.joints.is_empty();
+    let column = time_of(rows.names(), &layout.time).filter(|_| !stated)?;
+    (!is_stated(rows, column)).then_some(column)
+}
+
+/// Whether the name of a column of times states its unit, or its rows carry times of their own.
+pub(super) fn is_stated(rows: &dyn LogRows, column: usize) -> bool {
+    let name = &rows.names()[column];
+    unit_of(name).is_some()
+        || TimeUnit::of_suffix(name).is_some()
+        || rest_of(rows.names(), column).is_some()
+        || rows.is_recording()
+}
+
+/// The first numbers of a column; none where it holds dates, which have no unit.
+pub(super) fn first_numbers(
+    files: &[PathBuf],
+    layout: &Layout,
+    column: usize,
+) -> Result<Option<Vec<f64>>, LogError> {
+    let mut rows = open(files, layout, RowStrictness::Record)?.rows;
+    let mut numbers = Vec::with_capacity(UNIT_ROWS);
+    while numbers.len() < UNIT_ROWS && rows.next()?.is_some() {
+        match rows.logged(column) {
+            Some(number) => numbers.push(number),
+            None => return Ok(None),
+        }
+    }
+    Ok(Some(numbers))
 }
 
 #[cfg(test)]

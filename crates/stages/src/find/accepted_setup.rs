@@ -3,6 +3,7 @@
 use super::check_setup::check_setup_where_possible;
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
+use crate::input::error::IdentifyError;
 use crate::input::logged_robot::LoggedRobot;
 use crate::note::{SetupNote, StageNote};
 use crate::setup::{Finding, FindingSeverity, SetupReport};
@@ -62,10 +63,7 @@ pub fn accepted_setup(data: Dataset, control: &Control) -> Result<AcceptedSetup,
             edits: found.edits,
         })));
     }
-    let data = match found.limited {
-        Some(machine) => Dataset { machine, ..data },
-        None => data,
-    };
+    let data = found.limited.unwrap_or(data);
     Ok(AcceptedSetup {
         data,
         report,
@@ -83,20 +81,26 @@ impl AcceptedSetup {
 
 impl ContradictedSetup {
     /// The same with the robot of a file that is right by the torques, which is named.
-    pub fn put_right(self, file: &str, corrected: RobotFile) -> AcceptedSetup {
+    ///
+    /// # Errors
+    /// Logs that cannot be read by it.
+    pub fn put_right(
+        self,
+        file: &str,
+        corrected: RobotFile,
+        control: &Control,
+    ) -> Result<AcceptedSetup, IdentifyError> {
         let right = self.report.refusals().map(|finding| {
             StageNote::Setup(SetupNote::PutRight {
                 file: file.to_owned(),
                 finding: Box::new(finding.clone()),
             })
         });
-        AcceptedSetup {
-            notes: self.notes.into_iter().chain(right).collect(),
-            data: Dataset {
-                machine: LoggedRobot::new(file, corrected),
-                ..self.data
-            },
+        let corrected = LoggedRobot::new(file, corrected);
+        Ok(AcceptedSetup {
+            notes: self.notes.iter().cloned().chain(right).collect(),
+            data: self.data.of_robot(corrected, control)?,
             report: self.report,
-        }
+        })
     }
 }

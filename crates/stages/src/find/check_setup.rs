@@ -15,6 +15,7 @@ use crate::input::control::Control;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::setup_file::ChannelTables;
 use crate::input::unknowns::columns;
@@ -29,8 +30,8 @@ pub struct CheckedSetup {
     pub corrected: Option<RobotFile>,
     /// What differs in it.
     pub edits: Vec<KeyEdit>,
-    /// The robot as it is declared, with the torques that its drives do not exceed; none where there are none.
-    pub limited: Option<LoggedRobot>,
+    /// The data of the robot as it is declared, with the torques that its drives do not exceed; none where there are none.
+    pub limited: Option<Dataset>,
 }
 
 /// [`check_setup`] where the logs can be checked; of others the stage that reads them says why they cannot.
@@ -82,10 +83,10 @@ pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, Id
     );
     let searched = search(&problem, &|| control.stopped());
     control.check()?;
-    let mut found = checked(machine, &problem, &searched);
+    let mut found = checked(data, &problem, &searched, control)?;
     // a limit that leaves too little to fit is not taken
     if let Some(limited) = &found.limited
-        && sampled(limited, logs, control).is_err()
+        && sampled(&limited.machine, &limited.logs, control).is_err()
     {
         control.check()?;
         found.limited = None;
@@ -132,7 +133,7 @@ fn known(machine: &LoggedRobot) -> KnownBeforehand {
 /// A bounded number of rows of logs, as the robot file declares them.
 fn sampled(
     machine: &LoggedRobot,
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
 ) -> Result<(Channels, Sample), IdentifyError> {
     let n = machine.robot.joints();
@@ -146,11 +147,11 @@ fn sampled(
     let mut channels: Option<Channels> = None;
     let whole = logs.iter().filter(|log| log.reduced().is_none());
     for (index, log) in whole.enumerate() {
-        let mut open = machine.open(log, control)?;
+        let mut open = log.open(control)?;
         let of_log = channels_of(machine, log, open.layout());
         if of_log.drive == Drive::Motors {
             // positions that belong to no pose are what is looked for
-            open = machine.open_channels(log, control)?;
+            open = log.open_channels(control)?;
         }
         channels.get_or_insert(of_log);
         let run = motion::run(
@@ -174,7 +175,13 @@ fn sampled(
     Ok((channels.ok_or(IdentifyError::NoLog)?, thinner.finish()))
 }
 
-fn checked(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
+fn checked(
+    data: &Dataset,
+    problem: &Problem,
+    searched: &Searched,
+    control: &Control,
+) -> Result<CheckedSetup, IdentifyError> {
+    let machine = &data.machine;
     let declared = ChannelTables::new(&machine.file, problem.channels.drive == Drive::Motors);
     let edits = searched.correction.as_ref().map(|by| declared.edits(by));
     let edits = edits.unwrap_or_default();
@@ -190,20 +197,20 @@ fn checked(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> Che
             let own = file.log.joint.entry(of.joint.clone()).or_default();
             own.torque_limit = Some(of.limit);
         }
-        LoggedRobot::new(&machine.name, file)
+        data.of_robot(LoggedRobot::new(&machine.name, file), control)
     });
-    CheckedSetup {
-        limited,
+    Ok(CheckedSetup {
+        limited: limited.transpose()?,
         report,
         corrected: by.map(|by| declared.corrected(&edits, by)),
         edits,
-    }
+    })
 }
 
 /// The channels of a log as the robot file declares them.
-fn channels_of(machine: &LoggedRobot, log: &Log, layout: &Layout) -> Channels {
+fn channels_of(machine: &LoggedRobot, log: &LogData, layout: &Layout) -> Channels {
     let n = machine.robot.joints();
-    if matches!(log, Log::Arrays(_)) {
+    if matches!(log.source(), Log::Arrays(_)) {
         return Channels::of_joints(n);
     }
     let gears = machine.file.gear_matrix();

@@ -17,7 +17,7 @@ use crate::input::control::{Control, Progress};
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::{InMemory, read_each};
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::{own_laws, refined};
 use crate::input::position_cutoff::known;
@@ -158,7 +158,7 @@ pub fn diagnose(
             model: name.to_owned(),
         });
     }
-    if let Some(fault) = without_gains(machine).or(refused(machine, &data.logs, control)?) {
+    if let Some(fault) = without_gains(machine).or(refused(&data.logs)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
     each_row_once(machine, &[("fit", &data.logs), ("holdout", &data.held_out)])?;
@@ -166,7 +166,7 @@ pub fn diagnose(
         (&data.logs, LogRole::Train),
         (&data.held_out, LogRole::Holdout),
     ];
-    let roles = |(logs, role): &(&Vec<Log>, LogRole)| vec![*role; logs.len()];
+    let roles = |(logs, role): &(&Vec<LogData>, LogRole)| vec![*role; logs.len()];
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [&*data.logs, &data.held_out].concat();
     let laws = known(&given.model);
@@ -261,7 +261,7 @@ pub fn diagnose(
     let added = diagnosis.written().next().is_some();
     let fitted = files.pop().map(|(_, file)| file).filter(|_| added);
     in_memory.stretches = std::mem::take(&mut case.stretches);
-    let logs: Vec<String> = all.iter().map(Log::name).collect();
+    let logs: Vec<String> = all.iter().map(LogData::name).collect();
     for aside in &diagnosis.set_aside {
         control.note(&format!(
             "{}: {:.2}..{:.2} s set aside as the holdout",
@@ -326,13 +326,9 @@ fn without_gains(machine: &LoggedRobot) -> Option<DataFault> {
 }
 
 /// The first fault for which a fit refuses one of the logs.
-fn refused(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    control: &Control,
-) -> Result<Option<DataFault>, IdentifyError> {
+fn refused(logs: &[LogData]) -> Result<Option<DataFault>, IdentifyError> {
     for log in logs {
-        if let Some(fault) = machine.fault(log, control)? {
+        if let Some(fault) = log.recording()?.inspection.refusal().cloned() {
             return Ok(Some(DataFault {
                 kind: fault.kind.word().to_owned(),
                 channel: fault.channel,

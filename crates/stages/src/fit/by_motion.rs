@@ -11,7 +11,7 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_each;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::{in_file, refined};
 use crate::input::position_cutoff::known;
@@ -33,11 +33,11 @@ const MIN_WINDOWS_PER_NUMBER: f64 = 4.0;
 pub(crate) fn by_motion(
     machine: &LoggedRobot,
     found: &mut IdentifiedDynamics,
-    logs: &[Log],
+    logs: &[LogData],
     window: Option<f64>,
     control: &Control,
 ) -> Result<(), IdentifyError> {
-    if let Some(part) = logs.iter().find_map(Log::reduced) {
+    if let Some(part) = logs.iter().find_map(LogData::reduced) {
         return Err(ReducedError::NeedsLog {
             log: part.name().to_owned(),
             what: "the motion that --open-loop simulates".to_owned(),

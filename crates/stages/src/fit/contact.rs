@@ -2,7 +2,7 @@
 
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
-use crate::input::log::Log;
+use crate::input::log_data::{LogData, bridges};
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::unknowns::{FittedUnknown, columns};
@@ -22,7 +22,7 @@ const ROOM_S: f64 = 0.1;
 /// Stretches of these logs in which something pushes the robot, one note each.
 pub(crate) fn contacts(
     machine: &LoggedRobot,
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
 ) -> Result<Vec<StageNote>, IdentifyError> {
     let linear = machine.file.friction_law() != FrictionLawKind::DoubleTanh;
@@ -40,7 +40,7 @@ impl LogPasses<'_> {
     pub(crate) fn contacts(&self) -> Result<Vec<StageNote>, IdentifyError> {
         let noted = |(log, jump): &(usize, ResidualJump)| {
             let log = &self.logs[*log];
-            let first = self.machine.first_row(log, self.control)?;
+            let first = log.first_row()?;
             Ok(StageNote::Fit(contact(self.machine, log, jump, first)))
         };
         self.jumps.iter().map(noted).collect()
@@ -48,7 +48,7 @@ impl LogPasses<'_> {
 }
 
 /// `first` is the time of the first row that is read, as the rows have it [s].
-fn contact(machine: &LoggedRobot, log: &Log, jump: &ResidualJump, first: f64) -> FitNote {
+fn contact(machine: &LoggedRobot, log: &LogData, jump: &ResidualJump, first: f64) -> FitNote {
     let [from, to] = jump.span.map(|t| t - first);
     let names = machine.robot.joint_names();
     let joints = jump.joints.iter();
@@ -64,20 +64,19 @@ fn contact(machine: &LoggedRobot, log: &Log, jump: &ResidualJump, first: f64) ->
 /// What a fit says with the rows that were bridged as they were logged, where that is another thing.
 pub(crate) fn hangs_on_bridged(
     machine: &LoggedRobot,
-    logs: &[Log],
+    logs: &[LogData],
     (linear, rows): (&RegressorColumns, &BlockFactors),
     unknowns: &[FittedUnknown],
     control: &Control,
 ) -> Result<Option<FitNote>, IdentifyError> {
-    if !machine.bridges(logs, control)? {
+    if !bridges(logs)? {
         return Ok(None);
     }
     let kept = machine.keeping(RowFault::Spike);
-    let mut passes = LogPasses::new(&kept, logs, control).each_by_itself(kept.own_settings(
-        logs,
-        &[],
-        control,
-    )?);
+    let logs = logs.iter().map(|log| log.read_again(&kept, control));
+    let logs = &logs.collect::<Result<Vec<_>, _>>()?;
+    let own = kept.own_settings(logs, &[], control)?;
+    let mut passes = LogPasses::new(&kept, logs, control).each_by_itself(own);
     let as_logged = passes.read(PositionFilter::Declared, linear, None)?;
     let (Ok(now), Ok(other)) = (
         fit(rows, RowWeighting::Wls),

@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::new_model;
 use crate::input::one_joint::{self, OneJointLog};
@@ -182,7 +182,7 @@ type LogsByJoint = (BTreeMap<usize, JointLogs>, Vec<Provenance>, Vec<StageNote>)
 
 fn by_joint(
     machine: &LoggedRobot,
-    logs: &[Log],
+    logs: &[LogData],
     settings: &FrictionSettings,
     control: &Control,
 ) -> Result<LogsByJoint, IdentifyError> {

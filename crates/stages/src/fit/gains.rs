@@ -9,6 +9,7 @@ use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::gain_error::GainError;
 use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::setup_file::differences;
@@ -76,14 +77,24 @@ pub struct FittedGains {
 }
 
 impl FittedGains {
-    /// Logs as the robot with the gains reads them: what is in memory is multiplied by them, a file is
-    /// read by them.
+    /// The data as the robot with the gains reads them: what is in memory is multiplied by them, a file is read by them.
     ///
     /// # Errors
-    /// Arrays of another robot.
-    pub fn logs(&self, logs: &[Log]) -> Result<Vec<Log>, IdentifyError> {
-        let of = |log: &Log| log.with_torques_times(&self.factors);
-        Ok(logs.iter().map(of).collect::<Result<_, _>>()?)
+    /// Arrays of another robot, and logs that cannot be read by them.
+    pub fn data(&self, data: &Dataset, control: &Control) -> Result<Dataset, IdentifyError> {
+        let scaled = |logs: &[LogData]| -> Result<Vec<LogData>, IdentifyError> {
+            let logs = logs
+                .iter()
+                .map(|log| log.source().with_torques_times(&self.factors));
+            let logs = logs.collect::<Result<Vec<Log>, _>>()?;
+            LogData::read_all(&self.machine, &logs, &[], control)
+        };
+        Ok(Dataset {
+            machine: self.machine.clone(),
+            logs: scaled(&data.logs)?,
+            one_joint: scaled(&data.one_joint)?,
+            held_out: scaled(&data.held_out)?,
+        })
     }
 }
 
@@ -106,8 +117,9 @@ pub fn fit_gains(
         return Err(GainError::MassHidden.into());
     }
     let loaded: Vec<Log> = payload.iter().map(|p| p.log.clone()).collect();
+    let loaded = LogData::read_all(machine, &loaded, &[logs], control)?;
     let mut columns = columns(machine, None);
-    columns.rest_at(machine.rest_speeds(&[logs, &loaded].concat(), control)?);
+    columns.rest_at(machine.rest_speeds(&[logs, &loaded].concat())?);
     let mut reading = LoadReadings {
         unloaded: LogPasses::new(machine, logs, control),
         loaded: LogPasses::new(machine, &loaded, control),

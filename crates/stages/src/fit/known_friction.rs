@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::note::{FrictionNote, StageNote};
 use cft_ident_core::friction::estimate::curve_std;
@@ -73,14 +73,14 @@ impl FrictionBefore {
     pub fn of(
         machine: &LoggedRobot,
         (name, file): (&str, &ModelFile),
-        logs: &[Log],
+        logs: &[LogData],
         (estimator, hold): (EstimatorKind, bool),
         control: &Control,
     ) -> Result<Self, IdentifyError> {
         let known = logs.iter().filter(|_| !hold);
         let known = known.map(|log| match log {
-            Log::Reduced(part) => Ok(part.provenance.clone()),
-            log => machine.open(log, control)?.provenance(),
+            LogData::Reduced(part) => Ok(part.provenance.clone()),
+            log => log.open(control)?.provenance(),
         });
         let given = known.collect::<Result<Vec<_>, _>>()?;
         let mut before = FrictionBefore {

@@ -18,7 +18,7 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::gain_error::GainError;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::model::refined;
 use crate::input::own_settings::CutoffCosts;
 use crate::input::passes::LogPasses;
@@ -80,7 +80,7 @@ pub fn lsq(
             estimator: estimator.name(),
         });
     }
-    let reduced: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
+    let reduced: Vec<&ReducedLog> = logs.iter().filter_map(LogData::reduced).collect();
     if let Some(part) = reduced.first()
         && estimator != EstimatorKind::Wls
     {
@@ -122,7 +122,7 @@ pub fn lsq(
     // in amperes nothing says what a body can be
     let consistent = match settings.consistent && is_in_si(machine) {
         true => {
-            let fastest = machine.fastest(logs, control)?;
+            let fastest = machine.fastest(logs)?;
             let found = consistent(machine, &estimated, &fastest);
             or_plain_fit(found, &mut passes.notes)
         }
@@ -168,7 +168,7 @@ pub fn lsq(
         // `oe` has the friction among its unknowns
         if estimator != EstimatorKind::Oe {
             friction_of_fit = before.after(machine, &columns, &covariance);
-            let fastest = machine.fastest(logs, control)?;
+            let fastest = machine.fastest(logs)?;
             notes.extend(before.beyond(machine, &columns, &covariance, &fastest));
         }
     }

@@ -1,16 +1,12 @@
 //! The declared numbers beside effects, fitted as the given model was: by `lsq` on the same logs, with the torques of
 //! the effects taken off. With no effect it gives back the given model.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
-
 use super::consistent::project_by;
 use super::lsq::{LsqSettings, lsq};
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
-use crate::input::held_torque::HeldTorque;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::unknown_key::key_of;
 use cft_ident_core::diagnose::{ModelProposal, Unknown, value_of};
@@ -20,13 +16,14 @@ use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::Provenance;
+use cft_ident_logs::recording::TorqueCourse;
 
 /// How the declared numbers of a proposal are fitted.
 pub(crate) struct OwnRefit<'a> {
     pub machine: &'a LoggedRobot,
     pub given: &'a GivenModel,
     /// The logs that are fitted.
-    pub logs: &'a [Log],
+    pub logs: &'a [LogData],
     pub stretches: &'a [Stretch],
     pub unknowns: &'a [Unknown],
     /// The friction of the given model stays as it is.
@@ -98,31 +95,29 @@ impl OwnRefit<'_> {
             hold_friction: own.hold_friction,
             ..LsqSettings::default()
         };
-        let data = Dataset::new(&self.holding(model), self.logs);
+        let data = Dataset::new(self.machine, &self.logs_without(model));
         let found = lsq(&data, &settings, &self.control.quiet())?;
         Ok(found.model(self.machine, own.friction.as_ref().map(|given| &given.file)))
     }
 
-    /// The robot, the torques of a model's effects taken off its logs.
-    fn holding(&self, model: &AugmentedModel) -> LoggedRobot {
+    /// The logs less the torques of a model's effects.
+    fn logs_without(&self, model: &AugmentedModel) -> Vec<LogData> {
         let plain = AugmentedModel::plain(model.model.clone());
-        let mut held = vec![HeldTorque::default(); self.logs.len()];
+        let mut courses = vec![TorqueCourse::default(); self.logs.len()];
         for stretch in self.stretches {
-            let Some(held) = held.get_mut(stretch.log) else {
+            let Some(course) = courses.get_mut(stretch.log) else {
                 continue;
             };
             let (mut torque, alone) = (model.reconstruct(stretch), plain.reconstruct(stretch));
             for (torque, alone) in torque.iter_mut().zip(&alone) {
                 torque.iter_mut().zip(alone).for_each(|(x, y)| *x -= y);
             }
-            held.push(stretch, torque);
+            course.push(stretch, torque);
         }
-        let keys = self.logs.iter().map(Log::key);
-        let held: BTreeMap<String, HeldTorque> = keys.zip(held).collect();
-        LoggedRobot {
-            held: Arc::new(held),
-            ..self.machine.clone()
-        }
+        let pairs = self.logs.iter().zip(courses);
+        pairs
+            .map(|(log, course)| log.minus_torque(course))
+            .collect()
     }
 
     /// The given model with the declared numbers by the judge's sums, consistent ones nearest to them in their metric.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::fit::estimate::estimate;
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::LogPasses;
 use crate::input::reduced::reduced_log::ReducedLog;
@@ -88,7 +88,7 @@ impl Source {
         let file = RobotFile::parse(&name, &part.made_with.robot_file)?;
         let machine = LoggedRobot::new(&name, file);
         part.belongs_to_robot(&machine.file)?;
-        let log = Log::Reduced(part.clone());
+        let log = LogData::Reduced(part.clone());
         let known = part.known_friction();
         let linear = columns(&machine, known.as_deref());
         let mut passes = LogPasses::new(&machine, from_ref(&log), control);

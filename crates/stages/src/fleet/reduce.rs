@@ -8,6 +8,7 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::passes::{LogPasses, PositionFilter};
 use crate::input::reduced::{MadeWith, ReducedLog, ReducedLogs, ReducedRows};
 use crate::input::repeated::each_row_once;
@@ -61,7 +62,7 @@ pub fn reduce(
         .collect();
     let mut sets = Vec::new();
     for log in logs {
-        if let Log::Reduced(log) = log {
+        if let LogData::Reduced(log) = log {
             log.belongs_to(&made_with)?;
             let logs = vec![log.clone()];
             sets.push(ReducedLogs::of(logs));
@@ -69,7 +70,7 @@ pub fn reduce(
         }
         let one = std::slice::from_ref(log);
         let own = machine.own_settings(one, &laws, control)?;
-        let fastest = machine.fastest(one, control)?;
+        let fastest = machine.fastest(one)?;
         let mut passes = LogPasses::new(machine, one, control).each_by_itself(own.clone());
         let declared = passes.read_condensed(&linear)?;
         let narrower = passes.read(PositionFilter::Narrower, &linear.with_torque_rates(), None)?;
@@ -77,7 +78,7 @@ pub fn reduce(
         for grid in 0..passes.readings_again() {
             shifted.extend(passes.read_shifted(&linear, grid, None)?);
         }
-        let bounds_s = machine.bounds(log, control)?;
+        let bounds_s = log.bounds()?;
         let (Some(own), Some(summary), Some(provenance)) =
             (own.into_iter().next(), passes.summary, passes.inputs.pop())
         else {

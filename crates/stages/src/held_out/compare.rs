@@ -10,6 +10,7 @@ use crate::input::dataset::GivenModel;
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::{InMemory, read_whole};
 use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::refined_or_friction;
 use crate::input::position_cutoff::known;
@@ -239,7 +240,10 @@ pub fn compare(
     notes.extend(repeated_rows(logs, Some(&machine.file.layout())));
     let tried = match logs {
         [] => None,
-        logs => Some(on_logs(&machine, &sides, logs, control)?),
+        logs => {
+            let logs = LogData::read_all(&machine, logs, &[], control)?;
+            Some(on_logs(&machine, &sides, &logs, control)?)
+        }
     };
     if let Some(tried) = &tried {
         notes.extend(tried.in_memory.notes.iter().cloned());
@@ -257,7 +261,7 @@ pub fn compare(
 fn on_logs(
     machine: &LoggedRobot,
     sides: &[ComparedFile; 2],
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
 ) -> Result<TriedOnLogs, IdentifyError> {
     // one motion for both models: that of the first

@@ -4,7 +4,7 @@
 use crate::band::{self, Deviation, Directions, Error, Folds, FreeColumns, held_out, without_each};
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
 use crate::note::{FitNote, StageNote};
@@ -74,7 +74,7 @@ impl Pieces {
 pub(crate) fn hold_out(
     machine: &LoggedRobot,
     (file, model): (&ModelFile, &AugmentedModel),
-    (logs, inputs): (&[Log], &[Provenance]),
+    (logs, inputs): (&[LogData], &[Provenance]),
     control: &Control,
 ) -> Result<Held, IdentifyError> {
     Trial::new(machine, (file, model), (logs, inputs), control).run(FOLDS)
@@ -84,13 +84,13 @@ pub(crate) fn hold_out(
 pub(crate) fn on_other_logs(
     machine: &LoggedRobot,
     (file, model): (&ModelFile, &AugmentedModel),
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
 ) -> Result<(Held, Vec<Provenance>), IdentifyError> {
     let machine = &machine.with_position_cutoffs(logs, &known(&model.model), control)?;
     let mut inputs = Vec::new();
     for log in logs {
-        let mut open = machine.open(log, control)?;
+        let mut open = log.open(control)?;
         let mut block = Block::default();
         while open.read(&mut block)? {}
         inputs.push(open.provenance()?);
@@ -104,14 +104,14 @@ pub(crate) fn read_pieces(
     machine: &LoggedRobot,
     settings: &FilterSettings,
     model: &AugmentedModel,
-    (logs, inputs): (&[Log], &[Provenance]),
+    (logs, inputs): (&[LogData], &[Provenance]),
     control: &Control,
 ) -> Result<Vec<Stretch>, IdentifyError> {
     let n = machine.robot.joints();
     let pieces = Pieces::of_each(MOST_ROWS, inputs);
     let mut all = Vec::new();
     for ((index, log), pieces) in logs.iter().enumerate().zip(&pieces) {
-        let mut open = machine.open(log, control)?;
+        let mut open = log.open(control)?;
         let mut first = None;
         let (mut found, _) = stretches(index, n, settings, &mut |block| {
             let more = open.read(block)?;
@@ -123,7 +123,7 @@ pub(crate) fn read_pieces(
         .map_err(|e| open.ended(e))?;
         open.count_run_time(&mut found);
         if model.takes_temperatures() {
-            let temperatures = machine.temperatures_for(model, log, open.origin())?;
+            let temperatures = machine.temperatures_for(model, log)?;
             for stretch in &mut found {
                 stretch.temperature = temperatures.along(&stretch.t, n);
             }
@@ -138,7 +138,7 @@ struct Trial<'a> {
     settings: FilterSettings,
     file: &'a ModelFile,
     model: &'a AugmentedModel,
-    logs: &'a [Log],
+    logs: &'a [LogData],
     inputs: &'a [Provenance],
     observed: Vec<Pieces>,
     control: &'a Control,
@@ -148,7 +148,7 @@ impl<'a> Trial<'a> {
     fn new(
         machine: &'a LoggedRobot,
         (file, model): (&'a ModelFile, &'a AugmentedModel),
-        (logs, inputs): (&'a [Log], &'a [Provenance]),
+        (logs, inputs): (&'a [LogData], &'a [Provenance]),
         control: &'a Control,
     ) -> Self {
         let inputs = &inputs[..logs.len().min(inputs.len())];
@@ -174,7 +174,7 @@ impl<'a> Trial<'a> {
             1 => vec![self.model.clone()],
             _ => {
                 let filters = ParallelFilters::design(&self.settings, &stretches);
-                let speeds = self.machine.rest_speeds(self.logs, self.control)?;
+                let speeds = self.machine.rest_speeds(self.logs)?;
                 without_each(
                     self.model,
                     &self.free(),
@@ -287,8 +287,8 @@ impl<'a> Trial<'a> {
         let mut quiet = QuietTorques::default();
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
-            let mut open = self.machine.open(log, self.control)?;
-            let temperatures = (self.machine).temperatures_for(self.model, log, open.origin())?;
+            let mut open = log.open(self.control)?;
+            let temperatures = (self.machine).temperatures_for(self.model, log)?;
             let mut watched: Vec<Watched> = (models.iter().enumerate())
                 .map(|(fold, model)| Watched::new((index, fold), (model, &uncertain), &settings))
                 .collect::<Result<_, _>>()

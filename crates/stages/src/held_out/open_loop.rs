@@ -4,7 +4,7 @@ use super::hold_out::read_pieces;
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_each;
-use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
 use crate::note::{ModelNote, StageNote};
@@ -20,7 +20,7 @@ const WINDOW_S: f64 = 0.25;
 pub(crate) fn open_loop(
     machine: &LoggedRobot,
     refined: &AugmentedModel,
-    logs: &[Log],
+    logs: &[LogData],
     window: Option<f64>,
     control: &Control,
 ) -> Result<OpenLoop, IdentifyError> {
@@ -45,7 +45,7 @@ pub(crate) fn open_loop(
 pub(crate) fn free_run(
     machine: &LoggedRobot,
     refined: &AugmentedModel,
-    (logs, inputs): (&[Log], &[Provenance]),
+    (logs, inputs): (&[LogData], &[Provenance]),
     control: &Control,
 ) -> Result<Option<FreeRun>, IdentifyError> {
     if !is_in_si(machine) || logs.iter().any(|log| log.reduced().is_some()) {

@@ -8,6 +8,7 @@ use crate::input::control::Control;
 use crate::input::dataset::GivenModel;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
 use crate::note::StageNote;
@@ -61,9 +62,9 @@ pub fn torque(
     // torque, deviation, and half the band's width
     let kinds = if band.is_some() { 3 } else { 2 };
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
-    let open = |log: &Log| machine.open_positions(log, control);
+    let log = &LogData::read_positions(machine, log, control)?;
     let logs = std::slice::from_ref(log);
-    let machine = &machine.with_cutoffs_along(logs, &known(model), &vec![0.0; n], &open)?;
+    let machine = &machine.with_cutoffs_along(logs, &known(model), &vec![0.0; n], control)?;
     let as_held = machine.as_held(&file.held_out);
     let machine = as_held.as_ref().unwrap_or(machine);
     // every row gets its torque: nothing is decimated, and nothing left off at the ends
@@ -74,7 +75,7 @@ pub fn torque(
         ..machine.settings()
     };
     let work = control.begin("torque", None);
-    let mut open = machine.open_positions(log, control)?;
+    let mut open = log.open(control)?;
     let origin = open.origin();
     let mut peak = vec![0.0f64; n];
     let mut square = vec![0.0f64; n];
@@ -106,7 +107,7 @@ pub fn torque(
     } else {
         // effects remember: they need a stretch from its begin
         let (found, summary) = motion::stretches(0, n, &settings, &mut read).map_err(failed)?;
-        let temperatures = machine.temperatures_for(refined, log, origin)?;
+        let temperatures = machine.temperatures_for(refined, log)?;
         let mut values = vec![0.0; kinds * n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for mut stretch in found {

@@ -10,6 +10,7 @@ use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_whole;
 use crate::input::log::Log;
+use crate::input::log_data::LogData;
 use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::refined;
 use crate::input::of_robot::{JointRanges, TorquePeaks};
@@ -154,7 +155,7 @@ pub fn validate(
 pub(crate) fn errors_on_fitted(
     machine: &LoggedRobot,
     file: &ModelFile,
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
 ) -> Result<TorqueErrors, IdentifyError> {
     let model = refined(file, &machine.name)?;
@@ -247,8 +248,8 @@ pub fn not_a_validation(errors: &TorqueErrors) -> Option<StageNote> {
 }
 
 /// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
-fn smoothed_alike(machine: &LoggedRobot, logs: &[Log]) -> Result<(), IdentifyError> {
-    let parts: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
+fn smoothed_alike(machine: &LoggedRobot, logs: &[LogData]) -> Result<(), IdentifyError> {
+    let parts: Vec<&ReducedLog> = logs.iter().filter_map(LogData::reduced).collect();
     let Some(first) = parts.first().filter(|_| machine.finds_cutoffs()) else {
         return Ok(());
     };
@@ -278,7 +279,7 @@ fn smoothed_alike(machine: &LoggedRobot, logs: &[Log]) -> Result<(), IdentifyErr
 }
 
 /// The logs whose rows are there.
-fn not_reduced(logs: &[Log]) -> Vec<Log> {
+fn not_reduced(logs: &[LogData]) -> Vec<LogData> {
     let whole = logs.iter().filter(|log| log.reduced().is_none());
     whole.cloned().collect()
 }
@@ -287,7 +288,7 @@ fn reconstruct(
     machine: &LoggedRobot,
     (refined, file): (&AugmentedModel, &ModelFile),
     band: Option<&Band>,
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
     row: &mut dyn FnMut(&ReconstructedRow, Instant),
 ) -> Result<Validated, IdentifyError> {
@@ -296,10 +297,11 @@ fn reconstruct(
         |motion: [&[f64]; 3], tau: &[f64], out: &mut [f64]| band.half_widths(motion, tau, out)
     });
     let widths: Option<HalfWidths> = widths.as_ref().map(|widths| widths as HalfWidths);
-    let speeds = machine.rest_speeds(&not_reduced(logs), control)?;
+    let speeds = machine.rest_speeds(&not_reduced(logs))?;
     let mut all = TorqueReconstruction::new(&refined.model, &speeds, widths);
     let (mut inputs, mut last) = (Vec::new(), None);
-    let mut notes = repeated_rows(logs, Some(&machine.file.layout()));
+    let sources: Vec<Log> = logs.iter().map(LogData::source).collect();
+    let mut notes = repeated_rows(&sources, Some(&machine.file.layout()));
     let settings = machine.settings();
     let mut segments = 0;
     for log in logs {
@@ -313,7 +315,7 @@ fn reconstruct(
             continue;
         }
         if refined.effects.is_empty() {
-            let mut open = machine.open(log, control)?;
+            let mut open = log.open(control)?;
             let origin = open.origin();
             all.count_from(origin.seconds());
             let summary = all
@@ -344,7 +346,7 @@ fn reconstruct(
         all.end_log();
         work.advance(1);
     }
-    if let Some(part) = logs.iter().find_map(Log::reduced) {
+    if let Some(part) = logs.iter().find_map(LogData::reduced) {
         notes.push(StageNote::Model(ModelNote::ErrorsOfReduced {
             log: part.name().to_owned(),
         }));

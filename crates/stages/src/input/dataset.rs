@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::LoggedRobot;
 use super::model::refined;
 use cft_ident_core::effect::AugmentedModel;
@@ -14,16 +16,55 @@ use cft_ident_files::config::ModelFile;
 pub struct Dataset {
     pub machine: LoggedRobot,
     /// Logs that are fitted; those that are looked at, where a stage fits nothing.
-    pub logs: Vec<Log>,
+    pub logs: Vec<LogData>,
     /// Logs of one moving joint each, which a campaign gives to the friction filter.
-    pub one_joint: Vec<Log>,
+    pub one_joint: Vec<LogData>,
     /// Logs that are never fitted and judge what is added to a model.
-    pub held_out: Vec<Log>,
+    pub held_out: Vec<LogData>,
 }
 
 impl Dataset {
-    /// Logs of a robot, all of them to be fitted or looked at.
-    pub fn new(machine: &LoggedRobot, logs: &[Log]) -> Self {
+    /// Reads logs of a robot, all of them to be fitted or looked at.
+    ///
+    /// # Errors
+    /// Logs that cannot be read.
+    pub fn read(
+        machine: &LoggedRobot,
+        logs: &[Log],
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
+        let logs = LogData::read_all(machine, logs, &[], control)?;
+        Ok(Self::new(machine, &logs))
+    }
+
+    /// The same with logs that are held out.
+    ///
+    /// # Errors
+    /// Logs that cannot be read.
+    pub fn holding_out(self, held_out: &[Log], control: &Control) -> Result<Self, IdentifyError> {
+        let held_out = LogData::read_all(&self.machine, held_out, &[&self.logs], control)?;
+        Ok(Dataset { held_out, ..self })
+    }
+
+    /// The same logs as another robot file reads them.
+    ///
+    /// # Errors
+    /// Logs that cannot be read by it.
+    pub fn of_robot(&self, machine: LoggedRobot, control: &Control) -> Result<Self, IdentifyError> {
+        let again = |logs: &[LogData]| {
+            let logs = logs.iter().map(|log| log.read_again(&machine, control));
+            logs.collect::<Result<Vec<_>, _>>()
+        };
+        Ok(Dataset {
+            logs: again(&self.logs)?,
+            one_joint: again(&self.one_joint)?,
+            held_out: again(&self.held_out)?,
+            machine,
+        })
+    }
+
+    /// Logs that were read, all of them to be fitted or looked at.
+    pub fn new(machine: &LoggedRobot, logs: &[LogData]) -> Self {
         Dataset {
             machine: machine.clone(),
             logs: logs.to_vec(),
@@ -33,7 +74,7 @@ impl Dataset {
     }
 
     /// The same with logs that are held out.
-    pub fn with_held_out(self, held_out: &[Log]) -> Self {
+    pub fn with_held_out(self, held_out: &[LogData]) -> Self {
         Dataset {
             held_out: held_out.to_vec(),
             ..self

@@ -2,7 +2,7 @@
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::LoggedRobot;
 use crate::note::StageNote;
 use cft_ident_core::motion::{FilterSettings, Stretch, Summary, stretches};
@@ -31,7 +31,7 @@ pub struct InMemory {
 /// A log that cannot be read, or more samples than memory is meant to hold.
 pub fn read_whole(
     machine: &LoggedRobot,
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
 ) -> Result<InMemory, IdentifyError> {
     read_each(
@@ -46,7 +46,7 @@ pub fn read_whole(
 pub(crate) fn read_each(
     machine: &LoggedRobot,
     settings: &[FilterSettings],
-    logs: &[Log],
+    logs: &[LogData],
     control: &Control,
 ) -> Result<InMemory, IdentifyError> {
     let n = machine.robot.joints();
@@ -58,7 +58,7 @@ pub(crate) fn read_each(
     let mut averaged = false;
     for (index, (log, settings)) in logs.iter().zip(settings).enumerate() {
         let name = log.name();
-        let mut open = machine.open(log, control)?;
+        let mut open = log.open(control)?;
         origin = origin.or_else(|| Some(open.origin()));
         averaged |= open.is_centred();
         let (mut found, summary) = stretches(index, n, settings, &mut |block| open.read(block))
@@ -76,7 +76,7 @@ pub(crate) fn read_each(
             });
         }
         notes.extend(open.notes_with(&summary));
-        notes.extend(machine.put_temperatures(log, open.origin(), &mut found)?);
+        notes.extend(machine.put_temperatures(log, &mut found)?);
         inputs.push(open.provenance()?);
         all.extend(found);
         last = Some(summary);
@@ -92,6 +92,6 @@ pub(crate) fn read_each(
         summary,
         origin,
         averaged,
-        rest_speed: machine.rest_speeds(logs, control)?,
+        rest_speed: machine.rest_speeds(logs)?,
     })
 }

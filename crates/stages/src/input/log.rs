@@ -1,4 +1,4 @@
-//! What a stage is given as a log: a file, or arrays in memory.
+//! Where a log is: in a file, or in memory.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::reduced::reduced_log::ReducedLog;
 use cft_ident_logs::log::{Layout, LogArrays, LogError, LogSpec, Reader, escape};
 
-/// A log.
+/// Where a log is.
 #[derive(Debug, Clone)]
 pub enum Log {
     /// A file or a part of it, its channels mapped as the robot file says.
@@ -99,35 +99,31 @@ impl Log {
         })
     }
 
-    /// What distinguishes it from other logs.
-    pub(crate) fn key(&self) -> String {
-        match self {
-            Self::File(spec) => spec.to_string(),
-            Self::Arrays(arrays) => format!("{} {}", arrays.name(), arrays.sha256()),
-            Self::Reduced(part) => format!("{} {}", part.name(), part.provenance.sha256),
-        }
-    }
-
-    /// Opens it. Arrays are joint-side already: of `layout` they take only whether torques are read.
+    /// Goes along its rows as they come, neither looked at nor mended.
     pub(crate) fn reader(&self, layout: &Layout, joints: &[String]) -> Result<Reader, LogError> {
         match self {
             Self::File(spec) => Reader::open(spec, layout),
-            Self::Reduced(part) => Err(LogError::Format {
-                file: escape(part.name()),
-                kind: "a reduced log",
-                remedy: "its rows are not there any more: give the log itself",
-            }),
-            Self::Arrays(arrays) => {
-                let plain = Layout::joint_columns(joints);
-                Reader::of_arrays(
-                    arrays,
-                    match layout.torques.is_empty() {
-                        true => plain.without_torques(),
-                        false => plain,
-                    },
-                )
-            }
+            Self::Reduced(part) => Err(without_rows(part)),
+            Self::Arrays(arrays) => Reader::of_arrays(arrays, arrays_layout(layout, joints)),
         }
+    }
+}
+
+/// The layout of arrays, which are joint-side already: of `layout` they take only whether torques are read.
+pub(crate) fn arrays_layout(layout: &Layout, joints: &[String]) -> Layout {
+    let plain = Layout::joint_columns(joints);
+    match layout.torques.is_empty() {
+        true => plain.without_torques(),
+        false => plain,
+    }
+}
+
+/// Why a reduced log cannot be read.
+pub(crate) fn without_rows(part: &ReducedLog) -> LogError {
+    LogError::Format {
+        file: escape(part.name()),
+        kind: "a reduced log",
+        remedy: "its rows are not there any more: give the log itself",
     }
 }
 

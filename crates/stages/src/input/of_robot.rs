@@ -1,7 +1,7 @@
 //! Whether a log can be of the robot of a model: where its joints stand, and how large its torques are.
 
 use super::error::IdentifyError;
-use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::LoggedRobot;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
@@ -108,7 +108,7 @@ impl TorquePeaks {
         &self,
         errors: &TorqueErrors,
         machine: &LoggedRobot,
-        logs: &[Log],
+        logs: &[LogData],
     ) -> Option<IdentifyError> {
         let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
         let rms = |j: usize| errors.joints.get(j).map_or(0.0, |e| e.rmse);
@@ -116,7 +116,7 @@ impl TorquePeaks {
             **m > 0.0 && r.0 > IMPOSSIBLE_TORQUE_RATIO * **m && rms(*j) > **m
         });
         let (j, (measured, (torque, t))) = off.next()?;
-        let names: Vec<String> = logs.iter().map(Log::name).collect();
+        let names: Vec<String> = logs.iter().map(LogData::name).collect();
         Some(IdentifyError::Impossible {
             joint: machine.robot.joint_names()[j].clone(),
             log: names.join(", "),

@@ -2,7 +2,7 @@
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::{LoggedRobot, narrowed};
 use crate::note::StageNote;
 use cft_ident_core::friction::motions::motions;
@@ -51,10 +51,10 @@ fn processing(machine: &LoggedRobot, rate_hz: f64) -> FilterSettings {
 /// narrower filter, by which the smoothing's own part in an estimate is seen.
 pub fn read(
     machine: &LoggedRobot,
-    log: &Log,
+    log: &LogData,
     control: &Control,
 ) -> Result<OneJointLog, IdentifyError> {
-    let (mut open, zero_order_hold) = machine.open_raw(log, control)?;
+    let (mut open, zero_order_hold) = log.open_raw(control)?;
     let mut whole = Block::default();
     let mut block = Block::default();
     while open.read(&mut block)? {

@@ -4,49 +4,48 @@ use std::sync::Arc;
 
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
-use super::first_look::FirstLook;
-use super::held_torque::HeldTorque;
 use crate::note::{LogNote, RowLoss, StageNote};
-use cft_ident_core::motion::{MotionError, RunError, Stretch, Summary, ZeroOrderHold};
-use cft_ident_core::robot::Robot;
-use cft_ident_logs::inspect::RowCutter;
-use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader};
+use cft_ident_core::motion::{MotionError, RunError, Stretch, Summary};
+use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader, escape};
+use cft_ident_logs::recording::{Recording, RowBlocks};
 
 /// A velocity column is off by more than filters and steps make of it.
 const VELOCITY_SCALE_TOLERANCE: f64 = 0.1;
 
 /// A log that is being read.
 pub struct OpenLog<'a> {
-    pub(crate) reader: Reader,
-    pub(crate) control: &'a Control,
-    /// Brings motor forces by a zero-order hold to the rows' own time and pose.
-    pub(crate) centre: Option<(&'a Robot, ZeroOrderHold)>,
-    /// Torques of effects that a fit holds.
-    pub(crate) held: Option<&'a HeldTorque>,
-    pub(crate) name: String,
-    pub(crate) look: Arc<FirstLook>,
-    pub(crate) cutter: RowCutter,
+    blocks: RowBlocks,
+    control: &'a Control,
+    name: String,
+    recording: Arc<Recording>,
 }
 
-impl OpenLog<'_> {
+impl<'a> OpenLog<'a> {
+    pub(crate) fn new(
+        name: &str,
+        recording: &Arc<Recording>,
+        blocks: RowBlocks,
+        control: &'a Control,
+    ) -> Self {
+        OpenLog {
+            blocks,
+            control,
+            name: escape(name),
+            recording: Arc::clone(recording),
+        }
+    }
+
+    fn reader(&self) -> &Reader {
+        self.blocks.reader()
+    }
+
     /// The next block, without the rows that are marked bad; false at the end.
     pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
         loop {
             if self.control.stopped() {
                 return Err(ReadError::Interrupted);
             }
-            let more = self.reader.read(block)?;
-            if let Some((robot, hold)) = &mut self.centre {
-                hold.centre(robot, block);
-            }
-            if block.tau.is_empty() {
-                // a log without torques moves with none
-                block.tau.resize(block.q.len(), 0.0);
-            }
-            if let Some(held) = self.held {
-                held.take_off(block);
-            }
-            self.cutter.cut(block);
+            let more = self.blocks.read(block)?;
             if !more || !block.is_empty() {
                 return Ok(more);
             }
@@ -55,19 +54,19 @@ impl OpenLog<'_> {
 
     /// Which columns are read.
     pub(crate) fn layout(&self) -> &Layout {
-        self.reader.layout()
+        self.reader().layout()
     }
 
     /// Counts stretches from where the machine began to run, as far as that is known: a part of a log begins later.
     pub(crate) fn count_run_time(&self, stretches: &mut [Stretch]) {
         for stretch in stretches {
-            stretch.began += self.reader.started_s();
+            stretch.began += self.reader().started_s();
         }
     }
 
     /// The instant from which the times of the blocks are counted.
     pub fn origin(&self) -> Instant {
-        self.look.gate.origin()
+        self.recording.origin()
     }
 
     /// What was left out, mended or chosen, once the last block is read: how many rows each cause costs,
@@ -97,13 +96,13 @@ impl OpenLog<'_> {
             Some((names.get(j)?.clone(), factor))
         };
         let off: Vec<(String, f64)> = self
-            .look
+            .recording
             .velocities
             .iter()
             .enumerate()
             .filter_map(off)
             .collect();
-        let known = self.look.velocities.iter().flatten().count();
+        let known = self.recording.velocities.iter().flatten().count();
         let (first, others) = off.split_first()?;
         let alike = |(_, x): &(String, f64)| (x / first.1 - 1.0).abs() < VELOCITY_SCALE_TOLERANCE;
         Some(LogNote::VelocityScale {
@@ -115,20 +114,29 @@ impl OpenLog<'_> {
 
     fn costs_and_places(&self, too_short: u64) -> Vec<StageNote> {
         let lost = self.rows_lost(too_short).map(StageNote::Log);
-        let of_reader = self.reader.warnings().into_iter().map(StageNote::OfReader);
-        let marked = self.look.gate.warnings().into_iter().map(|sentence| {
-            StageNote::Log(LogNote::Marked {
-                log: self.name.clone(),
-                sentence,
-            })
-        });
+        let of_reader = self
+            .reader()
+            .warnings()
+            .into_iter()
+            .map(StageNote::OfReader);
+        let marked = self
+            .recording
+            .inspection
+            .warnings()
+            .into_iter()
+            .map(|sentence| {
+                StageNote::Log(LogNote::Marked {
+                    log: self.name.clone(),
+                    sentence,
+                })
+            });
         lost.into_iter().chain(of_reader).chain(marked).collect()
     }
 
     /// How many rows each cause costs, the most first; `None` where none is left out or mended.
     fn rows_lost(&self, too_short: u64) -> Option<LogNote> {
-        let by_reader = self.reader.left_out();
-        let mut losses: Vec<RowLoss> = (self.look.gate.costs().iter())
+        let by_reader = self.reader().left_out();
+        let mut losses: Vec<RowLoss> = (self.recording.inspection.costs().iter())
             .map(|cost| RowLoss::Marked(*cost))
             .chain(by_reader.map(|(rows, kind)| RowLoss::Dropped(rows, kind)))
             .chain([RowLoss::TooShort(too_short)])
@@ -139,11 +147,11 @@ impl OpenLog<'_> {
             return None;
         }
         let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
-        let dropped = dropped + self.reader.not_read();
+        let dropped = dropped + self.reader().not_read();
         Some(LogNote::RowsLost {
             log: self.name.clone(),
-            rows: self.reader.samples() + dropped,
-            left_out: self.cutter.removed() + dropped + too_short,
+            rows: self.reader().samples() + dropped,
+            left_out: self.blocks.removed() + dropped + too_short,
             losses,
         })
     }
@@ -157,7 +165,7 @@ impl OpenLog<'_> {
                 left_out: matches!(error, MotionError::NoSegment { .. })
                     .then(|| {
                         let lost = self.rows_lost(0).map(|lost| lost.to_string());
-                        lost.or_else(|| self.reader.warnings().pop())
+                        lost.or_else(|| self.reader().warnings().pop())
                     })
                     .flatten()
                     .map(String::into_boxed_str),
@@ -168,7 +176,7 @@ impl OpenLog<'_> {
 
     /// Whether torques come from a zero-order hold and so are means of two rows here.
     pub(crate) fn is_centred(&self) -> bool {
-        self.centre.is_some()
+        self.blocks.is_centred()
     }
 
     /// Name, span, checksum and size of what was read.
@@ -176,7 +184,7 @@ impl OpenLog<'_> {
     /// # Errors
     /// A file that can no longer be read.
     pub fn provenance(&self) -> Result<Provenance, IdentifyError> {
-        Ok(self.reader.provenance()?)
+        Ok(self.reader().provenance()?)
     }
 }
 

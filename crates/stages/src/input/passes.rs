@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::control::{Control, ControlledWork};
 use super::error::IdentifyError;
-use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::{LoggedRobot, narrowed};
 use super::own_settings::{JointCost, OwnSettings};
 use crate::note::StageNote;
@@ -49,7 +49,7 @@ pub(crate) enum PositionFilter {
 /// Readings of the same logs, one after the other.
 pub struct LogPasses<'a> {
     pub(crate) machine: &'a LoggedRobot,
-    pub(crate) logs: &'a [Log],
+    pub(crate) logs: &'a [LogData],
     pub(crate) control: &'a Control,
     pub(crate) work: ControlledWork,
     pub inputs: Vec<Provenance>,
@@ -71,7 +71,7 @@ pub struct LogPasses<'a> {
 }
 
 impl<'a> LogPasses<'a> {
-    pub fn new(machine: &'a LoggedRobot, logs: &'a [Log], control: &'a Control) -> Self {
+    pub fn new(machine: &'a LoggedRobot, logs: &'a [LogData], control: &'a Control) -> Self {
         LogPasses {
             machine,
             logs,
@@ -96,7 +96,10 @@ impl<'a> LogPasses<'a> {
 
     /// Samples at standstill of these joints count from here on; not where logs were reduced without them.
     pub(crate) fn count_rests(&mut self, joints: &[usize]) -> bool {
-        let whole = !self.logs.iter().any(|log| matches!(log, Log::Reduced(_)));
+        let whole = !self
+            .logs
+            .iter()
+            .any(|log| matches!(log, LogData::Reduced(_)));
         if whole {
             self.counted = joints.to_vec();
         }
@@ -106,7 +109,7 @@ impl<'a> LogPasses<'a> {
     /// Whether the narrower reading of every log can have the rates of torques among its columns.
     pub(crate) fn have_torque_rates(&self) -> bool {
         self.logs.iter().all(|log| match log {
-            Log::Reduced(part) => part.holds_torque_rates(),
+            LogData::Reduced(part) => part.holds_torque_rates(),
             _ => true,
         })
     }
@@ -192,7 +195,7 @@ impl<'a> LogPasses<'a> {
         for (index, log) in self.logs.iter().enumerate() {
             let settings = self.settings(filter, index);
             let columns = self.columns_of(columns, index);
-            if let Log::Reduced(part) = log {
+            if let LogData::Reduced(part) = log {
                 all.push(match filter {
                     PositionFilter::Declared => part.rows(columns)?,
                     PositionFilter::Narrower => part.narrower_rows(columns)?,
@@ -203,7 +206,7 @@ impl<'a> LogPasses<'a> {
                 }
                 continue;
             }
-            let mut open = self.machine.open(log, self.control)?;
+            let mut open = log.open(self.control)?;
             let (sums, summary) = accumulate_weighted(
                 &self.machine.robot,
                 &columns,
@@ -259,8 +262,8 @@ impl<'a> LogPasses<'a> {
         let mut total: Option<(BlockFactors, SimulatedLoop)> = None;
         for (index, log) in self.logs.iter().enumerate() {
             let (settings, step) = (self.settings(filter, index), self.step_of(index));
-            let mut open = self.machine.open(log, self.control)?;
-            let mut logged = self.machine.open_reference(log)?;
+            let mut open = log.open(self.control)?;
+            let mut logged = log.references()?;
             let reference = match logged {
                 Some(_) => ReferenceSource::Logged,
                 None => ReferenceSource::Smoothed,
@@ -330,7 +333,7 @@ impl<'a> LogPasses<'a> {
     ) -> Result<BlockFactors, IdentifyError> {
         let log = &self.logs[index];
         let steps = self.noise_that_tells(index);
-        if let Log::Reduced(part) = log {
+        if let LogData::Reduced(part) = log {
             let noisy = match steps {
                 None => None,
                 Some(_) => part.shifted_rows(reading, columns.clone())?,
@@ -342,7 +345,7 @@ impl<'a> LogPasses<'a> {
         }
         let mut noise = steps.map(|steps| PositionNoise::new(&steps, reading, NOISE_SEED));
         let settings = self.settings(PositionFilter::Declared, index);
-        let mut open = self.machine.open(log, self.control)?;
+        let mut open = log.open(self.control)?;
         let read = accumulate_weighted(
             &self.machine.robot,
             &columns,
@@ -379,11 +382,11 @@ impl<'a> LogPasses<'a> {
                 self.work.advance(1);
                 continue;
             }
-            if let Log::Reduced(part) = log {
+            if let LogData::Reduced(part) = log {
                 all.extend(part.shifted_rows(grid, columns)?);
                 continue;
             }
-            let mut open = self.machine.open(log, self.control)?;
+            let mut open = log.open(self.control)?;
             let sums = accumulate_shifted(
                 &self.machine.robot,
                 &columns,

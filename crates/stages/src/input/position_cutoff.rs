@@ -8,9 +8,8 @@ use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::LoggedRobot;
-use super::open_log::OpenLog;
 use super::own_settings::{CutoffCosts, JointCost, OwnSettings};
 use crate::note::{FitNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
@@ -158,36 +157,32 @@ pub(crate) fn known(model: &Model) -> Vec<Option<JointFriction>> {
     model.friction.iter().map(|law| Some(*law)).collect()
 }
 
-/// Opens a log for its positions.
-type LogOpener<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
-
 impl LoggedRobot {
     /// The same robot with the position cut-offs that its logs call for; a law is none where it is not known.
     pub(crate) fn with_position_cutoffs(
         &self,
-        logs: &[Log],
+        logs: &[LogData],
         laws: &[Option<JointFriction>],
         control: &Control,
     ) -> Result<LoggedRobot, IdentifyError> {
-        let speeds = self.rest_speeds(logs, control)?;
-        self.with_cutoffs_along(logs, laws, &speeds, &|log| self.open(log, control))
+        let speeds = self.rest_speeds(logs)?;
+        self.with_cutoffs_along(logs, laws, &speeds, control)
     }
 
     /// The processing of each log by its own cut-offs, and by those of `together` for a joint that rests in it.
     pub(crate) fn settings_of_each(
         &self,
-        logs: &[Log],
+        logs: &[LogData],
         laws: &[Option<JointFriction>],
         together: &LoggedRobot,
         control: &Control,
     ) -> Result<Vec<FilterSettings>, IdentifyError> {
-        let of_log = |log: &Log| {
+        let of_log = |log: &LogData| {
             let log = std::slice::from_ref(log);
             let mut machine = self.clone();
             if self.finds_cutoffs() {
-                let speeds = self.rest_speeds(log, control)?;
-                let open = |log: &Log| self.open(log, control);
-                let costs = self.cutoff_costs(log, laws, &speeds, &open)?;
+                let speeds = self.rest_speeds(log)?;
+                let costs = self.cutoff_costs(log, laws, &speeds, control)?;
                 machine.position_cutoffs_hz =
                     Arc::new(costs.found_or(&together.position_cutoffs_hz));
             }
@@ -196,36 +191,35 @@ impl LoggedRobot {
         logs.iter().map(of_log).collect()
     }
 
-    /// The same for logs that `open` opens; nothing is read where cut-offs are declared.
+    /// The same by speeds up to which joints rest; nothing is read where cut-offs are declared.
     pub(crate) fn with_cutoffs_along(
         &self,
-        logs: &[Log],
+        logs: &[LogData],
         laws: &[Option<JointFriction>],
         rest_speed: &[f64],
-        open: LogOpener,
+        control: &Control,
     ) -> Result<LoggedRobot, IdentifyError> {
         if !self.finds_cutoffs() {
             return Ok(self.clone());
         }
-        Ok(self.with_cutoffs(&self.cutoff_costs(logs, laws, rest_speed, open)?))
+        Ok(self.with_cutoffs(&self.cutoff_costs(logs, laws, rest_speed, control)?))
     }
 
     /// What each log calls for. `laws` is the friction of each joint, none where it is not known.
     pub(crate) fn own_settings(
         &self,
-        logs: &[Log],
+        logs: &[LogData],
         laws: &[Option<JointFriction>],
         control: &Control,
     ) -> Result<Vec<OwnSettings>, IdentifyError> {
         logs.iter()
             .map(|log| {
-                if let Log::Reduced(part) = log {
+                if let LogData::Reduced(part) = log {
                     return Ok(part.own.clone());
                 }
-                let rest_speed = self.rest_speeds(std::slice::from_ref(log), control)?;
-                let open = |log: &Log| self.open(log, control);
+                let rest_speed = self.rest_speeds(std::slice::from_ref(log))?;
                 let costs =
-                    self.cutoff_costs(std::slice::from_ref(log), laws, &rest_speed, &open)?;
+                    self.cutoff_costs(std::slice::from_ref(log), laws, &rest_speed, control)?;
                 let cutoffs_hz = match self.finds_cutoffs() {
                     true => costs.found(),
                     false => Vec::new(),
@@ -260,7 +254,7 @@ impl LoggedRobot {
     /// Logs that cannot be read.
     pub fn smoothed_for(
         &self,
-        logs: &[Log],
+        logs: &[LogData],
         model: &AugmentedModel,
         control: &Control,
     ) -> Result<LoggedRobot, IdentifyError> {
@@ -299,10 +293,10 @@ impl LoggedRobot {
     /// What cut-offs cost the friction of every joint on logs.
     pub(crate) fn cutoff_costs(
         &self,
-        logs: &[Log],
+        logs: &[LogData],
         laws: &[Option<JointFriction>],
         rest_speed: &[f64],
-        open: LogOpener,
+        control: &Control,
     ) -> Result<CutoffCosts, IdentifyError> {
         let settings = self.settings();
         let raw = FilterSettings {
@@ -313,7 +307,7 @@ impl LoggedRobot {
         let most = (MOST_ROWS / logs.len().max(1)).max(LEAST_ROWS);
         let mut all: Vec<Stretch> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
-            let mut open = open(log)?;
+            let mut open = log.open(control)?;
             let mut rows = 0;
             let mut read = |block: &mut Block| {
                 let more = open.read(block)?;

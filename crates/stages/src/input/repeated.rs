@@ -2,21 +2,22 @@
 
 use super::error::IdentifyError;
 use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::LoggedRobot;
 use crate::note::{LogNote, StageNote};
 use cft_ident_logs::log::{Layout, Provenance, escape, sha256, shares_rows};
 
 /// Logs by what they are used for.
-pub(crate) type Role<'a> = (&'static str, &'a [Log]);
+pub(crate) type Role<'a> = (&'static str, &'a [LogData]);
 
 /// Refuses two logs with the same rows, within a role and between roles.
 pub(crate) fn each_row_once(machine: &LoggedRobot, roles: &[Role]) -> Result<(), IdentifyError> {
-    let all: Vec<(&str, &Log)> = roles
+    let all: Vec<(&str, Log)> = roles
         .iter()
-        .flat_map(|(role, logs)| logs.iter().map(|log| (*role, log)))
+        .flat_map(|(role, logs)| logs.iter().map(|log| (*role, log.source())))
         .collect();
     let layout = machine.file.layout();
-    let logs: Vec<&Log> = all.iter().map(|(_, log)| *log).collect();
+    let logs: Vec<&Log> = all.iter().map(|(_, log)| log).collect();
     match pairs(&logs, Some(&layout)).next() {
         None => Ok(()),
         Some((i, k)) => Err(IdentifyError::SameRows {
@@ -29,12 +30,16 @@ pub(crate) fn each_row_once(machine: &LoggedRobot, roles: &[Role]) -> Result<(),
 }
 
 /// Logs of the list that share no row with one of the others.
-pub(crate) fn without_rows_of(machine: &LoggedRobot, logs: &[Log], others: &[Log]) -> Vec<Log> {
+pub(crate) fn without_rows_of(
+    machine: &LoggedRobot,
+    logs: &[LogData],
+    others: &[LogData],
+) -> Vec<LogData> {
     let layout = machine.file.layout();
-    let fresh = |log: &&Log| {
+    let fresh = |log: &&LogData| {
         !others
             .iter()
-            .any(|other| same_rows(log, other, Some(&layout)))
+            .any(|other| same_rows(&log.source(), &other.source(), Some(&layout)))
     };
     logs.iter().filter(fresh).cloned().collect()
 }

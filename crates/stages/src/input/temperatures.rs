@@ -2,6 +2,7 @@
 
 use super::error::IdentifyError;
 use super::log::Log;
+use super::log_data::LogData;
 use super::logged_robot::LoggedRobot;
 use crate::note::{LogNote, StageNote};
 use cft_ident_core::effect::{AugmentedModel, Law};
@@ -60,28 +61,13 @@ pub(crate) fn none_on(stream: &str, model: &AugmentedModel) -> IdentifyError {
 }
 
 impl LoggedRobot {
-    /// Temperatures of a log whose times count from `origin`; none where nothing names their columns.
-    ///
-    /// # Errors
-    /// A log that lacks a column that is named, or a temperature that is no number.
-    pub fn temperatures(&self, log: &Log, origin: Instant) -> Result<JointTemperatures, LogError> {
-        match (log, self.file.temperature_layout()) {
-            (Log::File(spec), Some((joints, layout))) => {
-                JointTemperatures::read(spec, (&joints, &layout), origin)
-            }
-            (Log::Arrays(arrays), _) => Ok(arrays.temperatures()),
-            _ => Ok(JointTemperatures::default()),
-        }
-    }
-
     /// Puts the temperatures of a log beside its stretches; a column that it lacks is noted.
     pub(crate) fn put_temperatures(
         &self,
-        log: &Log,
-        origin: Instant,
+        log: &LogData,
         stretches: &mut [Stretch],
     ) -> Result<Option<StageNote>, LogError> {
-        match self.temperatures(log, origin) {
+        match log.recording()?.temperatures() {
             Ok(found) => {
                 for stretch in stretches {
                     stretch.temperature = found.along(&stretch.t, self.robot.joints());
@@ -100,7 +86,7 @@ impl LoggedRobot {
     pub fn check_temperatures(
         &self,
         model: &AugmentedModel,
-        logs: &[Log],
+        logs: &[LogData],
         stretches: &[Stretch],
     ) -> Result<(), IdentifyError> {
         self.check_taken(&of_model(model), logs, stretches)
@@ -110,13 +96,14 @@ impl LoggedRobot {
     pub(crate) fn check_taken(
         &self,
         taken: &[EffectTemperature],
-        logs: &[Log],
+        logs: &[LogData],
         stretches: &[Stretch],
     ) -> Result<(), IdentifyError> {
         for EffectTemperature { effect, joint } in taken {
             let lacking = stretches.iter().find(|s| !s.has_temperature(*joint));
             if let Some(log) = lacking.and_then(|s| logs.get(s.log)) {
-                return Err(self.no_temperature(log, effect, *joint));
+                let error = log.recording().and_then(|of| of.temperatures()).err();
+                return Err(self.no_temperature(&log.source(), error, (effect, *joint)));
             }
         }
         Ok(())
@@ -126,28 +113,59 @@ impl LoggedRobot {
     pub(crate) fn temperatures_for(
         &self,
         model: &AugmentedModel,
+        log: &LogData,
+    ) -> Result<JointTemperatures, IdentifyError> {
+        let found = log.recording()?.temperatures().cloned();
+        self.temperatures_among(model, &log.source(), found)
+    }
+
+    /// The same of a log that is read as its rows come, whose times count from `origin`.
+    pub(crate) fn temperatures_along(
+        &self,
+        model: &AugmentedModel,
         log: &Log,
         origin: Instant,
+    ) -> Result<JointTemperatures, IdentifyError> {
+        let found = match (log, self.file.temperature_layout()) {
+            (Log::File(spec), Some((joints, layout))) => {
+                JointTemperatures::read(spec, (&joints, &layout), origin)
+            }
+            (Log::Arrays(arrays), _) => Ok(arrays.temperatures()),
+            _ => Ok(JointTemperatures::default()),
+        };
+        self.temperatures_among(model, log, found)
+    }
+
+    fn temperatures_among(
+        &self,
+        model: &AugmentedModel,
+        log: &Log,
+        found: Result<JointTemperatures, LogError>,
     ) -> Result<JointTemperatures, IdentifyError> {
         let taken = of_model(model);
         if taken.is_empty() {
             return Ok(JointTemperatures::default());
         }
-        let found = self.temperatures(log, origin).unwrap_or_default();
-        match taken.iter().find(|t| found.at(t.joint, 0.0).is_none()) {
+        let at = |t: &EffectTemperature| found.as_ref().ok()?.at(t.joint, 0.0);
+        match taken.iter().find(|t| at(t).is_none()) {
             Some(EffectTemperature { effect, joint }) => {
-                Err(self.no_temperature(log, effect, *joint))
+                Err(self.no_temperature(log, found.err(), (effect, *joint)))
             }
-            None => Ok(found),
+            None => Ok(found.unwrap_or_default()),
         }
     }
 
-    fn no_temperature(&self, log: &Log, effect: &str, joint: usize) -> IdentifyError {
+    fn no_temperature(
+        &self,
+        log: &Log,
+        error: Option<LogError>,
+        (effect, joint): (&str, usize),
+    ) -> IdentifyError {
         let name = &self.robot.joint_names()[joint];
-        let why = match (self.temperatures(log, Instant::default()), log) {
-            (Err(error), _) => error.explanation(),
-            (Ok(_), Log::Arrays(_)) => "give it with the log's other arrays".into(),
-            (Ok(_), _) => format!(
+        let why = match (error, log) {
+            (Some(error), _) => error.explanation(),
+            (None, Log::Arrays(_)) => "give it with the log's other arrays".into(),
+            (None, _) => format!(
                 "name its column, `[log.joint.{name}] temperature = \"COLUMN\"` in the robot or model file, or leave {name} \
                  out of the formula and of the `joints` of its [[candidate]] table"
             )

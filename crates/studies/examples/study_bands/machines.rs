@@ -81,7 +81,8 @@ impl Machine {
         for rotation in 0..3 {
             let (fitted, unseen) = self.rotation(rotation);
             let found = lsq(
-                &Dataset::new(&machine, &fitted),
+                &Dataset::read(&machine, &fitted, &Control::default())
+                    .expect("logs that can be read"),
                 &LsqSettings::default(),
                 &control,
             )
@@ -126,7 +127,10 @@ impl Scored {
         let given = GivenModel::new("model", model.clone());
         let machine = given.machine();
         let control = Control::default();
-        let (data, tried) = (Dataset::new(&machine, logs), ValidateSettings::of(&given));
+        let (data, tried) = (
+            Dataset::read(&machine, logs, &Control::default()).expect("logs that can be read"),
+            ValidateSettings::of(&given),
+        );
         let mut band = vec![[0.0; 3]; self.band.len()];
         // times and positions, by which forces act
         let mut positions: Vec<(f64, Vec<f64>)> = Vec::new();

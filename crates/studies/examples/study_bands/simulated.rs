@@ -41,7 +41,7 @@ impl Campaign {
             .collect();
         let settings = LsqSettings::default();
         let found = lsq(
-            &Dataset::new(&machine, &logs),
+            &Dataset::read(&machine, &logs, &Control::default()).expect("logs that can be read"),
             &settings,
             &Control::default(),
         )

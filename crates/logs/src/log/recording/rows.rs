@@ -222,19 +222,14 @@ impl LogRows for MessageRows {
     }
 
     #[cold]
-    fn clock_remedy(&self, t: f64) -> Option<String> {
-        let part = match t > 0.0 {
-            true => format!(", or use the part before it: FILE@0..{t}s"),
-            false => String::new(),
+    fn clock_remedy(&self) -> Option<String> {
+        let remedy = match self.reading.choice.time {
+            TimeSource::Log => {
+                "its messages lie in another order than that of their times: sort it first, `mcap sort IN.mcap -o OUT.mcap`"
+            }
+            _ => "take the times of recording, `stamp = \"log\"` in [log] of the robot file",
         };
-        Some(match self.reading.choice.time {
-            TimeSource::Log => format!(
-                "its messages lie in another order than that of their times: sort it first, `mcap sort IN.mcap -o OUT.mcap`{part}"
-            ),
-            _ => format!(
-                "take the times of recording, `stamp = \"log\"` in [log] of the robot file{part}"
-            ),
-        })
+        Some(remedy.to_owned())
     }
 
     fn number(&self) -> u64 {

@@ -9,8 +9,8 @@ use serde_json::Value;
 use super::columns::{self, HeldArray};
 use super::lines::{COLUMNS, Table, TableText, damaged, number, unusable};
 use super::numpy::TIMES;
-use crate::log::held_files::OpenFile;
 use crate::log::json_text::parsed;
+use crate::log::open_file::OpenFile;
 
 /// Bytes that one object may take as a row, and as the whole of a table.
 const LARGEST: usize = 1 << 20;

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 
 use super::columns::{HeldArray, table};
 use super::lines::{TableText, damaged, unusable};
-use crate::log::held_files::OpenFile;
+use crate::log::open_file::OpenFile;
 
 /// Largest file, unpacked, whose arrays are held.
 const LARGEST: u64 = 1 << 28;

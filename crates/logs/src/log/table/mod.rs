@@ -17,7 +17,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::LogError;
-use super::held_files::OpenFile;
+use super::open_file::OpenFile;
 use super::source::{file_name, shown};
 pub(super) use lines::TableText;
 

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufReader, Read, Write};
 
-use super::super::held_files::OpenFile;
+use super::super::open_file::OpenFile;
 use super::lines::{damaged, number};
 use super::literal::PythonLiteral;
 use super::zip::{self, ZipMember};

@@ -2,7 +2,7 @@
 
 use std::io::{self, BufReader, Read};
 
-use super::super::held_files::OpenFile;
+use super::super::open_file::OpenFile;
 use super::lines::{damaged, unusable};
 
 /// Largest comment behind the directory, and the directory's own end [bytes].

@@ -1,6 +1,6 @@
 //! How fast the joints of a log move, by which a rest is distinguished from a slow motion.
 
-use cft_ident_logs::log::{Block, RowConversion};
+use crate::log::{Block, RowConversion};
 
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against a motion.
 const SPACING_S: f64 = 0.02;

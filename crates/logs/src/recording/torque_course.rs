@@ -1,11 +1,11 @@
-//! Torques that are taken off logs as they are read: those of effects that a fit holds.
+//! Torques that are subtracted from a log: those of effects that a fit holds.
 
+use crate::log::Block;
 use cft_ident_core::motion::Stretch;
-use cft_ident_logs::log::Block;
 
-/// Torques along the stretches of one log.
+/// Torques along the stretches of one log [N or Nm].
 #[derive(Debug, Clone, Default)]
-pub(crate) struct HeldTorque {
+pub struct TorqueCourse {
     pieces: Vec<Piece>,
 }
 
@@ -18,16 +18,16 @@ struct Piece {
     torque: Vec<Vec<f64>>,
 }
 
-impl HeldTorque {
-    /// Adds what is held along a stretch, `[joint][sample]`.
+impl TorqueCourse {
+    /// Adds the torques along a stretch, `[joint][sample]`.
     pub fn push(&mut self, stretch: &Stretch, torque: Vec<Vec<f64>>) {
         let begin = stretch.t.first().copied().unwrap_or(0.0);
         let dt = stretch.dt;
         self.pieces.push(Piece { begin, dt, torque });
     }
 
-    /// Takes it off the torques of a block; before, between and behind the stretches what is nearest holds.
-    pub fn take_off(&self, block: &mut Block) {
+    /// Subtracts it from the torques of a block; before, between and behind the stretches what is nearest holds.
+    pub(crate) fn subtract_from(&self, block: &mut Block) {
         let joints = block.joints();
         for (t, tau) in block.t.iter().zip(block.tau.chunks_mut(joints.max(1))) {
             let behind = self.pieces.partition_point(|p| p.begin <= *t);
@@ -77,7 +77,7 @@ mod tests {
             t: (0..3).map(|k| begin + 0.5 * f64::from(k)).collect(),
             ..Stretch::default()
         };
-        let mut held = HeldTorque::default();
+        let mut held = TorqueCourse::default();
         held.push(&stretch(1.0), vec![vec![1.0, 2.0, 4.0], vec![0.0; 3]]);
         held.push(&stretch(10.0), vec![vec![8.0; 3], vec![1.0; 3]]);
         let t = vec![0.0, 1.0, 1.25, 2.0, 3.0, 9.0, 11.0];
@@ -87,7 +87,7 @@ mod tests {
             t,
             ..Block::default()
         };
-        held.take_off(&mut block);
+        held.subtract_from(&mut block);
         let of = |j: usize| {
             block
                 .tau

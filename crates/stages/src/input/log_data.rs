@@ -1,0 +1,343 @@
+//! A log as stages take it: read by a robot file, or reduced to what a linear fit needs.
+
+use std::sync::Arc;
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::free_swing::moves_freely;
+use super::log::{Log, arrays_layout, without_rows};
+use super::logged_robot::LoggedRobot;
+use super::open_log::OpenLog;
+use super::reduced::reduced_log::ReducedLog;
+use super::reference::LoggedReference;
+use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
+use cft_ident_logs::recording::{Recording, RecordingRequest, TorqueCourse};
+
+/// A log that was read, or a reduced one.
+#[derive(Debug, Clone)]
+pub enum LogData {
+    /// Its rows.
+    Recorded {
+        /// Where it was read from.
+        source: Log,
+        recording: Arc<Recording>,
+    },
+    /// Sums without rows.
+    Reduced(Arc<ReducedLog>),
+}
+
+impl LogData {
+    /// Reads logs by the channels of a robot file; what one of `beside` holds is not parsed again. A log with a fault
+    /// for which fits refuse it is read, and refused where its rows are asked for.
+    ///
+    /// # Errors
+    /// Logs that cannot be read.
+    pub fn read_all(
+        machine: &LoggedRobot,
+        logs: &[Log],
+        beside: &[&[LogData]],
+        control: &Control,
+    ) -> Result<Vec<Self>, IdentifyError> {
+        let layout = machine.file.layout();
+        let mut all: Vec<Self> = Vec::with_capacity(logs.len());
+        for log in logs {
+            let beside: Vec<&LogData> = beside.iter().copied().flatten().chain(&all).collect();
+            let read = Self::read_by(machine, log, &layout, &beside, control)?;
+            all.push(read);
+        }
+        Ok(all)
+    }
+
+    /// Reads one log as [`Self::read_all`] does.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    pub fn read(
+        machine: &LoggedRobot,
+        log: &Log,
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
+        Self::read_by(machine, log, &machine.file.layout(), &[], control)
+    }
+
+    /// Reads a log for its positions alone: it needs no torque channels.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    pub fn read_positions(
+        machine: &LoggedRobot,
+        log: &Log,
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
+        let layout = machine.file.layout().without_torques();
+        Self::read_by(machine, log, &layout, &[], control)
+    }
+
+    /// The same log by another robot file, less the same torques.
+    pub(crate) fn read_again(
+        &self,
+        machine: &LoggedRobot,
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
+        let layout = machine.file.layout();
+        let again = Self::read_by(machine, &self.source(), &layout, &[self], control)?;
+        Ok(match (self, again) {
+            (Self::Recorded { recording: own, .. }, Self::Recorded { source, recording }) => {
+                let recording = Arc::unwrap_or_clone(recording).minus_torque_of(own);
+                Self::Recorded {
+                    source,
+                    recording: Arc::new(recording),
+                }
+            }
+            (_, again) => again,
+        })
+    }
+
+    fn read_by(
+        machine: &LoggedRobot,
+        log: &Log,
+        layout: &Layout,
+        beside: &[&LogData],
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
+        let beside = beside.iter().filter_map(|other| match other {
+            Self::Recorded { recording, .. } => Some(&**recording),
+            Self::Reduced(_) => None,
+        });
+        let (keep, stop) = (&machine.file.log.keep, || control.stopped());
+        let request = RecordingRequest {
+            layout: match log {
+                Log::Arrays(_) => arrays_layout(layout, machine.robot.joint_names()),
+                _ => layout.clone(),
+            },
+            references: machine.file.reference_layout(),
+            temperatures: machine.file.temperature_layout(),
+            keep,
+            stop: &stop,
+            beside: &beside.collect::<Vec<_>>(),
+        };
+        let read = match log {
+            Log::File(spec) => Recording::read(spec, &request),
+            Log::Arrays(arrays) => Recording::of_arrays(arrays, &request),
+            Log::Reduced(part) => return Ok(Self::Reduced(Arc::clone(part))),
+        };
+        let read = read.map_err(|error| match error {
+            LogError::Interrupted => IdentifyError::Interrupted,
+            error => error.into(),
+        })?;
+        let longest = |dt: f64| machine.settings().longest_step(dt);
+        let mut read = read.cut_by(&longest);
+        if machine.file.zero_order_hold(read.layout().channels) {
+            read = read.held_by(machine.robot.clone());
+        }
+        let off = read.inspection.off();
+        if !off.is_empty() && read.inspection.refusal().is_none() {
+            let freely = keep.contains(&RowFault::StuckChannel)
+                || swings_freely(machine, (log, &read), &off, control)?;
+            read.set_swings_freely(freely);
+            read = read.cut_by(&longest);
+        }
+        Ok(Self::Recorded {
+            source: log.clone(),
+            recording: Arc::new(read),
+        })
+    }
+
+    /// Where it was read from.
+    pub fn source(&self) -> Log {
+        match self {
+            Self::Recorded { source, .. } => source.clone(),
+            Self::Reduced(part) => Log::Reduced(Arc::clone(part)),
+        }
+    }
+
+    /// The log, where it is reduced.
+    pub fn reduced(&self) -> Option<&ReducedLog> {
+        match self {
+            Self::Recorded { .. } => None,
+            Self::Reduced(part) => Some(part),
+        }
+    }
+
+    /// Name of the log in messages and results, without folders.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Recorded { source, .. } => source.name(),
+            Self::Reduced(part) => part.name().to_owned(),
+        }
+    }
+
+    /// What was read.
+    ///
+    /// # Errors
+    /// A reduced log.
+    pub fn recording(&self) -> Result<&Arc<Recording>, LogError> {
+        match self {
+            Self::Recorded { recording, .. } => Ok(recording),
+            Self::Reduced(part) => Err(without_rows(part)),
+        }
+    }
+
+    /// What was read, for a fit.
+    ///
+    /// # Errors
+    /// A reduced log, one whose rows are poses, and one with a fault for which fits refuse it.
+    pub(crate) fn usable(&self) -> Result<&Arc<Recording>, IdentifyError> {
+        let recording = self.recording()?;
+        if let Some(rate_hz) = recording.poses_hz {
+            return Err(IdentifyError::Poses {
+                log: escape(&self.name()),
+                rate_hz,
+            });
+        }
+        match recording.inspection.refusal() {
+            Some(fault) => Err(IdentifyError::Refused {
+                log: escape(&self.name()),
+                fault: Box::new(fault.clone()),
+            }),
+            None => Ok(recording),
+        }
+    }
+
+    /// Goes along its rows, every torque at the time and pose of its row.
+    ///
+    /// # Errors
+    /// A log that fits refuse.
+    pub fn open<'a>(&self, control: &'a Control) -> Result<OpenLog<'a>, IdentifyError> {
+        let recording = self.usable()?;
+        let blocks = recording.blocks()?;
+        Ok(OpenLog::new(&self.name(), recording, blocks, control))
+    }
+
+    /// Goes along its rows, torques as logged, and says whether each holds until the next row.
+    pub(crate) fn open_raw<'a>(
+        &self,
+        control: &'a Control,
+    ) -> Result<(OpenLog<'a>, bool), IdentifyError> {
+        let recording = self.usable()?;
+        let blocks = recording.held_blocks()?;
+        let open = OpenLog::new(&self.name(), recording, blocks, control);
+        Ok((open, recording.is_held()))
+    }
+
+    /// Goes along its rows as they were logged, in SI units: motors' channels stay what they are.
+    pub(crate) fn open_channels<'a>(
+        &self,
+        control: &'a Control,
+    ) -> Result<OpenLog<'a>, IdentifyError> {
+        let recording = self.usable()?;
+        let blocks = recording.logged_blocks()?;
+        Ok(OpenLog::new(&self.name(), recording, blocks, control))
+    }
+
+    /// The positions that the controller was asked for, where they are known.
+    pub(crate) fn references(&self) -> Result<Option<LoggedReference>, IdentifyError> {
+        let references = self.recording()?.references()?;
+        Ok(references.map(LoggedReference::new))
+    }
+
+    /// The same log less the torques of a course.
+    pub(crate) fn minus_torque(&self, course: TorqueCourse) -> Self {
+        match self {
+            Self::Recorded { source, recording } => Self::Recorded {
+                source: source.clone(),
+                recording: Arc::new(recording.minus_torque(course)),
+            },
+            Self::Reduced(_) => self.clone(),
+        }
+    }
+
+    /// First and last time, by the log's own clock [s].
+    pub(crate) fn bounds(&self) -> Result<[f64; 2], IdentifyError> {
+        let recording = self.usable()?;
+        let zero = recording.origin().seconds();
+        Ok(recording.time_span.map(|t| zero + t))
+    }
+
+    /// Time of the first row that is read, as its rows have it [s].
+    pub(crate) fn first_row(&self) -> Result<f64, IdentifyError> {
+        Ok(self.usable()?.time_span[0])
+    }
+}
+
+impl LoggedRobot {
+    /// Speed up to which each joint rests, by the log in which it moves most [m/s or rad/s].
+    pub(crate) fn rest_speeds(&self, logs: &[LogData]) -> Result<Vec<f64>, IdentifyError> {
+        self.greatest(logs, |log| Ok(&log.usable()?.rest_speed))
+    }
+
+    /// Greatest speed of every joint in these logs [m/s or rad/s].
+    pub(crate) fn fastest(&self, logs: &[LogData]) -> Result<Vec<f64>, IdentifyError> {
+        self.greatest(logs, |log| {
+            Ok(match log {
+                LogData::Reduced(part) => &part.fastest,
+                LogData::Recorded { .. } => &log.usable()?.top_speed,
+            })
+        })
+    }
+
+    /// The greatest of each joint in all logs.
+    fn greatest<'a>(
+        &self,
+        logs: &'a [LogData],
+        of: impl Fn(&'a LogData) -> Result<&'a Vec<f64>, IdentifyError>,
+    ) -> Result<Vec<f64>, IdentifyError> {
+        let mut greatest = vec![0.0_f64; self.robot.joints()];
+        for log in logs {
+            for (greatest, of_log) in greatest.iter_mut().zip(of(log)?) {
+                *greatest = of_log.max(*greatest);
+            }
+        }
+        Ok(greatest)
+    }
+}
+
+/// Refuses logs of held poses, which say nothing of inertia: gravity is fitted to them another way.
+///
+/// # Errors
+/// [`IdentifyError::Held`] where each log holds pose after pose, and logs that fits refuse.
+pub fn check_moving(logs: &[LogData]) -> Result<(), IdentifyError> {
+    let mut held = None;
+    for log in logs {
+        if log.reduced().is_some() {
+            return Ok(());
+        }
+        let Some(share) = log.usable()?.held_share else {
+            return Ok(());
+        };
+        held = Some(IdentifyError::Held {
+            log: escape(&log.name()),
+            share,
+        });
+    }
+    held.map_or(Ok(()), Err)
+}
+
+/// Whether numbers of these logs are bridged.
+pub(crate) fn bridges(logs: &[LogData]) -> Result<bool, IdentifyError> {
+    for log in logs {
+        if !log.usable()?.inspection.mending().bridges.is_empty() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Whether the robot moves as without its motors where torques are exactly 0.
+fn swings_freely(
+    machine: &LoggedRobot,
+    (log, read): (&Log, &Recording),
+    off: &[(usize, [f64; 2])],
+    control: &Control,
+) -> Result<bool, IdentifyError> {
+    let name = log.name();
+    let mut open = OpenLog::new(&name, &Arc::new(read.clone()), read.blocks()?, control);
+    // Behind coupled gears the motors' channels are not the joints'.
+    let n = machine.robot.joints();
+    let all = |(_, span): &(usize, [f64; 2])| (0..n).map(|j| (j, *span)).collect();
+    let off = match open.layout().conversion.is_none() {
+        true => off.to_vec(),
+        false => off.iter().flat_map::<Vec<_>, _>(all).collect(),
+    };
+    moves_freely(&machine.robot, &machine.settings(), &name, &mut open, &off)
+}
