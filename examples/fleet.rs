@@ -10,7 +10,7 @@
 use std::error::Error;
 
 use cft_ident::identify::{
-    Control, Dataset, Log, LoggedRobot, RobotSources, TrackSource, reduce, track,
+    Control, Dataset, Log, RobotSetup, RobotSources, TrackSource, reduce, track,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [robot, logs @ ..] = &arguments[..] else {
         return Err("give ROBOT.toml LOG...".into());
     };
-    let machine = LoggedRobot::load(robot)?;
+    let machine = RobotSetup::load(robot)?;
     let control = Control::default();
 
     let mut sources = Vec::new();

@@ -8,7 +8,7 @@
 use std::error::Error;
 
 use cft_ident::identify::{
-    Control, Dataset, DiagnoseEnd, DiagnoseSettings, GivenModel, Log, LoggedRobot, LsqSettings,
+    Control, Dataset, DiagnoseEnd, DiagnoseSettings, GivenModel, Log, LsqSettings, RobotSetup,
     ValidateSettings, check_setup, diagnose, lsq, validate,
 };
 
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [robot, log, output] = &arguments[..] else {
         return Err("give ROBOT.toml LOG OUTPUT.toml".into());
     };
-    let arm = LoggedRobot::load(robot)?;
+    let arm = RobotSetup::load(robot)?;
     let control = Control::default();
     let fitted = [Log::File(format!("{log}@0..70%").parse()?)];
     let held_out = [Log::File(format!("{log}@70..100%").parse()?)];

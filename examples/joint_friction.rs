@@ -7,14 +7,14 @@
 
 use std::error::Error;
 
-use cft_ident::identify::{Control, Dataset, FrictionSettings, Log, LoggedRobot, friction};
+use cft_ident::identify::{Control, Dataset, FrictionSettings, Log, RobotSetup, friction};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [robot, output, logs @ ..] = &arguments[..] else {
         return Err("give ROBOT.toml FRICTION.toml LOG...".into());
     };
-    let machine = LoggedRobot::load(robot)?;
+    let machine = RobotSetup::load(robot)?;
     let logs = logs.iter().map(|log| log.parse().map(Log::File));
     let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
 

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let empty = GivenModel::new(name, ModelFile::load(Path::new(name))?);
     let data = Dataset::read(
-        &empty.machine(),
+        &empty.setup(),
         &[Log::File(log.parse()?)],
         &Control::default(),
     )?;

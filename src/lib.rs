@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use cft_ident::config::RobotFile;
-//! use cft_ident::identify::{Dataset, Control, Log, LoggedRobot, LsqSettings, lsq};
+//! use cft_ident::identify::{Dataset, Control, Log, RobotSetup, LsqSettings, lsq};
 //!
 //! let arm = r#"
 //!     robot.model = "serial"
@@ -17,7 +17,7 @@
 //!     joint = "elbow"
 //!     xyz = [0.4, 0.0, 0.0]
 //! "#;
-//! let arm = LoggedRobot::new("arm.toml", RobotFile::parse("arm.toml", arm)?);
+//! let arm = RobotSetup::new("arm.toml", RobotFile::parse("arm.toml", arm)?);
 //! # use cft_ident::robot::friction::ViscousCoulomb;
 //! # use cft_ident::robot::model::{JointFriction, Model};
 //! # let friction = JointFriction::ViscousCoulomb(ViscousCoulomb { viscous: 0.8, coulomb: 1.5 });

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Dataset, DiagnoseSettings, GivenModel, Log, LoggedRobot, LsqSettings, ValidateSettings, diagnose, lsq,
+    Control, Dataset, DiagnoseSettings, GivenModel, Log, RobotSetup, LsqSettings, ValidateSettings, diagnose, lsq,
     validate,
 };
 use libfuzzer_sys::fuzz_target;
@@ -35,7 +35,7 @@ fuzz_target!(|data: &[u8]| {
     let Ok(log) = Log::of_rows("log", &t, &q, &tau) else {
         return;
     };
-    let machine = LoggedRobot::new("r.toml", robot.clone());
+    let machine = RobotSetup::new("r.toml", robot.clone());
     let control = Control::default();
     let Ok(data) = Dataset::read(&machine, std::slice::from_ref(&log), &Control::default()) else {
         return;

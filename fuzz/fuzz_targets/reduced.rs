@@ -5,7 +5,7 @@
 use std::sync::OnceLock;
 
 use cft_ident::config::RobotFile;
-use cft_ident::identify::{Dataset, Control, Log, LoggedRobot, LsqSettings, ReducedLogs, lsq, reduce};
+use cft_ident::identify::{Dataset, Control, Log, RobotSetup, LsqSettings, ReducedLogs, lsq, reduce};
 use libfuzzer_sys::fuzz_target;
 use sha2::{Digest, Sha256};
 
@@ -15,11 +15,11 @@ const SLIDE: &str = "[robot]\nmodel = \"single-joint\"\njoint = \"a\"\nkind = \"
 const CHECKSUM: usize = 64;
 
 /// A robot, and a log of it that is reduced.
-fn real() -> &'static (LoggedRobot, Vec<u8>) {
-    static REAL: OnceLock<(LoggedRobot, Vec<u8>)> = OnceLock::new();
+fn real() -> &'static (RobotSetup, Vec<u8>) {
+    static REAL: OnceLock<(RobotSetup, Vec<u8>)> = OnceLock::new();
     REAL.get_or_init(|| {
         let file = RobotFile::parse("r.toml", SLIDE).expect("the robot is right");
-        let machine = LoggedRobot::new("r.toml", file);
+        let machine = RobotSetup::new("r.toml", file);
         let t: Vec<f64> = (0..400).map(|k| f64::from(k) / 200.0).collect();
         let q: Vec<f64> = t.iter().map(|t| (3.0 * t).sin() + 0.2 * (17.0 * t).sin()).collect();
         let tau: Vec<f64> = t.iter().map(|t| -9.0 * (3.0 * t).sin() + 2.0 * (3.0 * t).cos()).collect();

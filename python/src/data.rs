@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use cft_ident::config::{ModelFile, RobotFile};
-use cft_ident::identify::{self, GivenModel, LoggedRobot, ReducedLogs, is_reduced};
+use cft_ident::identify::{self, GivenModel, ReducedLogs, RobotSetup, is_reduced};
 use cft_ident::log::{LogSpec, Provenance};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -15,7 +15,7 @@ use crate::errors::{UsageError, of_input, of_stage};
 /// A robot file.
 #[pyclass(frozen, module = "cft_ident._native")]
 pub struct Robot {
-    pub machine: LoggedRobot,
+    pub machine: RobotSetup,
 }
 
 #[pymethods]
@@ -23,7 +23,7 @@ impl Robot {
     /// From a file, or one that comes with the package such as `configs/ur10.toml`.
     #[staticmethod]
     fn load(path: &str) -> PyResult<Self> {
-        let machine = LoggedRobot::load(path).map_err(of_stage)?;
+        let machine = RobotSetup::load(path).map_err(of_stage)?;
         Ok(Robot { machine })
     }
 
@@ -32,7 +32,7 @@ impl Robot {
     fn parse(text: &str, name: &str) -> PyResult<Self> {
         let file = RobotFile::parse(name, text).map_err(of_input)?;
         Ok(Robot {
-            machine: LoggedRobot::new(name, file),
+            machine: RobotSetup::new(name, file),
         })
     }
 

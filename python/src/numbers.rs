@@ -185,7 +185,11 @@ pub fn covariance<'py>(
 ) -> PyResult<Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>> {
     let file = &model.given.file;
     // a model that predicts with other numbers than were estimated holds the covariance of the estimates
-    let Some(found) = file.estimate_covariance.as_ref().or(file.covariance.as_ref()) else {
+    let Some(found) = file
+        .estimate_covariance
+        .as_ref()
+        .or(file.covariance.as_ref())
+    else {
         return Ok(None);
     };
     let u = found.names.len();

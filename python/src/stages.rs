@@ -8,7 +8,7 @@ use cft_ident::cli;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
     self, AcceptedSetup, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings,
-    IdentifyError, LoggedRobot, LsqSettings, ReducedLogs, RobotSources, SetupRefusal, TrackSource,
+    IdentifyError, LsqSettings, ReducedLogs, RobotSetup, RobotSources, SetupRefusal, TrackSource,
     ValidateSettings, accepted_setup,
 };
 use cft_ident::report::json::{JsonDocument, NO_WARNINGS};
@@ -39,14 +39,14 @@ fn accepted(data: Dataset, control: &Control) -> PyResult<AcceptedSetup> {
             let first = found.report.refusals().next();
             InputError::new_err(format!(
                 "{}: the torques contradict the robot file: {}; or go on without by as_declared=True",
-                found.data.machine.name,
+                found.data.setup.name,
                 first.map(Finding::in_words).unwrap_or_default()
             ))
         }
     })
 }
 
-fn machine_of(robot: &Robot, as_declared: bool) -> LoggedRobot {
+fn machine_of(robot: &Robot, as_declared: bool) -> RobotSetup {
     match as_declared {
         true => robot.machine.clone().as_declared(),
         false => robot.machine.clone(),
@@ -85,8 +85,11 @@ pub fn friction(
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
     let old = model.map(|m| m.given.file.clone());
     work::run(py, move |control, _| {
-        let setup = accepted(Dataset::read(&machine, &logs, control).map_err(of_stage)?, control)?;
-        let machine = &setup.data.machine;
+        let setup = accepted(
+            Dataset::read(&machine, &logs, control).map_err(of_stage)?,
+            control,
+        )?;
+        let machine = &setup.data.setup;
         let settings = FrictionSettings { joint };
         let mut found = identify::friction(&setup.data, &settings, control).map_err(of_stage)?;
         setup.put_before(&mut found.setup, &mut found.notes);
@@ -94,7 +97,7 @@ pub fn friction(
         let document = JsonDocument::new("friction", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::friction::friction(&stages::friction::Friction {
-            machine,
+            setup: machine,
             found: &found,
             file: &model,
             path: "friction.toml",
@@ -151,8 +154,11 @@ pub fn lsq(
                 .belongs_to(&given.name, &machine.file)
                 .map_err(of_input)?;
         }
-        let setup = accepted(Dataset::read(&machine, &logs, control).map_err(of_stage)?, control)?;
-        let machine = &setup.data.machine;
+        let setup = accepted(
+            Dataset::read(&machine, &logs, control).map_err(of_stage)?,
+            control,
+        )?;
+        let machine = &setup.data.setup;
         let settings = LsqSettings {
             estimator: kind,
             consistent: !unconstrained,
@@ -166,7 +172,7 @@ pub fn lsq(
         let document = JsonDocument::new("lsq", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::lsq::lsq(&stages::lsq::LsqReport {
-            machine,
+            setup: machine,
             found: &found,
             file: &model,
             path: "model.toml",
@@ -189,7 +195,7 @@ pub fn validate(
     let logs = all(&logs);
     work::run(py, move |control, _| {
         let augmented = given.numbers().map_err(of_stage)?;
-        let data = Dataset::read(&given.machine(), &logs, control).map_err(of_stage)?;
+        let data = Dataset::read(&given.setup(), &logs, control).map_err(of_stage)?;
         let settings = ValidateSettings {
             free_run: true,
             ..ValidateSettings::of(&given)
@@ -199,7 +205,7 @@ pub fn validate(
         let document = JsonDocument::new("validate", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::validate::validate(&stages::validate::ValidateReport {
-            machine: &data.machine,
+            setup: &data.setup,
             file: &given.file,
             model: &augmented,
             logs: &names,
@@ -225,7 +231,7 @@ pub fn diagnose(
     let (of, given) = (model.given.clone(), model.provenance());
     let (train, holdout) = (all(&logs), all(&holdout));
     work::run(py, move |control, _| {
-        let (machine, file) = (of.machine(), &of.file);
+        let (machine, file) = (of.setup(), &of.file);
         let data = Dataset::read(&machine, &train, control).map_err(of_stage)?;
         let data = data.holding_out(&holdout, control).map_err(of_stage)?;
         let settings = DiagnoseSettings {
@@ -245,7 +251,7 @@ pub fn diagnose(
                 let document = JsonDocument::new("diagnose", inputs, notes, &result);
                 let refined = found.model(&machine, file);
                 let report = stages::diagnose::diagnose(&stages::diagnose::DiagnoseReport {
-                    machine: &machine,
+                    setup: &machine,
                     file,
                     given: &given,
                     found: &found,
@@ -273,7 +279,11 @@ pub fn reduce(
     let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
     let friction = model.map(|m| m.given.clone());
     work::run(py, move |control, _| {
-        let data = accepted(Dataset::read(&machine, &logs, control).map_err(of_stage)?, control)?.data;
+        let data = accepted(
+            Dataset::read(&machine, &logs, control).map_err(of_stage)?,
+            control,
+        )?
+        .data;
         let found = identify::reduce(&data, friction.as_ref(), control).map_err(of_stage)?;
         Ok(Part {
             logs: Arc::new(found),

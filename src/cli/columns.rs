@@ -7,7 +7,7 @@ use cft_ident_logs::inspect::{
     is_time,
 };
 use cft_ident_logs::log::{self, DeclaredChannels, Layout, RawReader};
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 
 /// Channels by their names alone.
 pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>), CliError> {
@@ -49,7 +49,7 @@ pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError>
 }
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from reading the log.
-pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Vec<LogFault>) {
+pub(super) fn of_robot(log: &RawReader, setup: &RobotSetup) -> (ColumnPlan, Vec<LogFault>) {
     let layout = log.layout();
     let names = log.names();
     let time = log.find(&layout.time);
@@ -57,22 +57,22 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, V
     let time = time.or_else(|| names.iter().position(|name| is_time(name)));
     let time = time.filter(|_| layout.section.rate_hz.is_none());
     let mut known: Vec<Option<ChannelColumn>> = vec![None; names.len()];
-    place(log, machine, layout, &mut known);
+    place(log, setup, layout, &mut known);
     if let Some(other) = &layout.otherwise {
         // A log may hold both sides of the gears.
-        place(log, machine, other, &mut known);
+        place(log, setup, other, &mut known);
     }
-    let missing = temperatures(log, machine, &mut known);
+    let missing = temperatures(log, setup, &mut known);
     let columns = known.into_iter().enumerate();
     let channels = columns.filter(|(column, _)| Some(*column) != time);
     let channels = channels.map(|(column, known)| known.unwrap_or_else(|| other(log, column)));
     let plan = ColumnPlan {
         time: time.map(|time| (time, seconds)),
         channels: channels.collect(),
-        keep: machine.file.log.keep.clone(),
+        keep: setup.file.log.keep.clone(),
         held: None,
         even: None,
-        band_hz: Some(machine.settings().cutoff_hz),
+        band_hz: Some(setup.settings().cutoff_hz),
     };
     let refused = log.refused().map(|error| refusal(error.explanation()));
     (plan, refused.into_iter().chain(missing).collect())
@@ -81,10 +81,10 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, V
 /// Finds the temperatures that the robot file names among the columns of a text log; what is not there.
 fn temperatures(
     log: &RawReader,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     known: &mut [Option<ChannelColumn>],
 ) -> Vec<LogFault> {
-    let Some((_, layout)) = (machine.file.temperature_layout()).filter(|_| !log.is_recording())
+    let Some((_, layout)) = (setup.file.temperature_layout()).filter(|_| !log.is_recording())
     else {
         return Vec::new();
     };
@@ -110,7 +110,7 @@ fn temperatures(
 /// Finds the channels of a layout among the columns that are not known yet.
 fn place(
     log: &RawReader,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     layout: &Layout,
     known: &mut [Option<ChannelColumn>],
 ) {
@@ -127,25 +127,25 @@ fn place(
             };
             let joint = &layout.joints[j];
             let kind = match raw {
-                true => machine.robot.coordinate_kind(j),
-                false => machine.robot.joint_kind(j),
+                true => setup.robot.coordinate_kind(j),
+                false => setup.robot.joint_kind(j),
             };
             let position = kind.position_unit();
             let unit = match role {
                 ChannelRole::Velocity => format!("{position}/s"),
                 ChannelRole::Torque if raw => "V".to_owned(),
-                ChannelRole::Torque => machine.file.torque_unit(j).to_owned(),
+                ChannelRole::Torque => setup.file.torque_unit(j).to_owned(),
                 _ => position.to_owned(),
             };
             let name = &log.names()[column];
             let mut seen = InspectedChannel::new(name, role, Some(joint), Some(&unit));
-            (seen.limits, seen.saturates) = limits(machine, (j, joint), role, raw);
+            (seen.limits, seen.saturates) = limits(setup, (j, joint), role, raw);
             if role == ChannelRole::Torque && !raw && !["N", "Nm"].contains(&&*unit) {
                 // the limit is that of a torque
                 seen.limits = None;
             }
             if role == ChannelRole::Position {
-                let limits = machine.file.limits.get(joint);
+                let limits = setup.file.limits.get(joint);
                 seen.speed = limits.and_then(|limits| limits.speed);
             }
             if role == ChannelRole::Torque && !raw {
@@ -206,16 +206,16 @@ fn seconds(unit: Option<&str>) -> Option<f64> {
 
 /// Limits of a channel, and whether a number at the limit is what was applied.
 fn limits(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     (j, joint): (usize, &str),
     role: ChannelRole,
     raw: bool,
 ) -> (Option<[f64; 2]>, bool) {
     // Volts are logged as the amplifier gave them.
     let applied = raw && role == ChannelRole::Torque;
-    let Some(limits) = machine.file.limits.get(joint) else {
+    let Some(limits) = setup.file.limits.get(joint) else {
         // Table 5 of the report
-        let of_set_up = match (machine.robot.transmission().limits(), role, raw) {
+        let of_set_up = match (setup.robot.transmission().limits(), role, raw) {
             (Some(limits), ChannelRole::Position, true) => limits.of(j),
             _ => None,
         };

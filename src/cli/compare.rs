@@ -71,11 +71,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let shown: Vec<String> = names.iter().map(|name| escape(name)).collect();
     let mut report = stages::compare::compare(&of, &shown.join(", "));
     let in_memory = of.tried.as_ref().filter(|_| drawn).map(|t| &t.in_memory);
-    let replay = pictures::replay(&of.machine, in_memory, &names)?;
+    let replay = pictures::replay(&of.setup, in_memory, &names)?;
     let replayed = replay.map(|replay| ReplayedPair::new(&replay, &of));
     let replayed = replayed.transpose().map_err(CliError::input)?;
     if args.report.is_some() {
-        let quality = pictures::inspected(&args.logs, &of.machine, context)?;
+        let quality = pictures::inspected(&args.logs, &of.setup, context)?;
         let (mut page, command) = (report.page(), &context.command);
         let replayed = replayed.as_ref();
         stages::compare::pictures(&mut page, &of, &read, replayed, &quality, command);

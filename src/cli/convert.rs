@@ -15,7 +15,7 @@ use cft_ident_logs::log::{
 };
 use cft_ident_logs::output::{LogForm, LogWriter};
 use cft_ident_report::report::json::JsonDocument;
-use cft_ident_stages::identify::{LoggedRobot, repeated_rows};
+use cft_ident_stages::identify::{RobotSetup, repeated_rows};
 
 const EXAMPLE: &str = "\
 Example:
@@ -192,17 +192,17 @@ fn as_it_stands(
 
 fn of_robot(
     spec: &LogSpec,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     target: &mut Target<'_>,
     warnings: &mut Vec<String>,
     context: &Context,
 ) -> Result<Provenance, CliError> {
-    let mut reader = Reader::open(spec, &machine.file.layout())?;
-    let joints = machine.robot.joint_names();
+    let mut reader = Reader::open(spec, &setup.file.layout())?;
+    let joints = setup.robot.joint_names();
     let n = joints.len();
     let kinds = &["q", "tau", "dq"][..if reader.has_velocities() { 3 } else { 2 }];
     let mut columns = columns_of(kinds, joints);
-    let warm = machine.file.temperature_layout();
+    let warm = setup.file.temperature_layout();
     let warm = warm.map_or(Vec::new(), |(joints, _)| joints);
     columns.extend(warm.iter().map(|j| format!("temperature_{}", joints[*j])));
     target.begin(spec, columns)?;
@@ -216,7 +216,7 @@ fn of_robot(
             let read = |(joints, layout): (Vec<usize>, Layout)| {
                 JointTemperatures::read(spec, (&joints, &layout), origin)
             };
-            courses = machine.file.temperature_layout().map(read).transpose()?;
+            courses = setup.file.temperature_layout().map(read).transpose()?;
         }
         for (k, t) in block.t.iter().enumerate() {
             let parts = [&block.q, &block.tau, &block.dq].map(|x| x.get(k * n..(k + 1) * n));
@@ -232,7 +232,7 @@ fn of_robot(
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(paths_of(&args.logs), [&*args.output])?;
-    let machine = args.robot.as_deref().map(LoggedRobot::load).transpose()?;
+    let setup = args.robot.as_deref().map(RobotSetup::load).transpose()?;
     let mut target = Target {
         path: &args.output,
         writer: None,
@@ -243,15 +243,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         without_time: 0,
     };
     let bar = context.progress("converting", Some(args.logs.len() as u64));
-    let file = machine.as_ref().map(|machine| &machine.file);
+    let file = setup.as_ref().map(|setup| &setup.file);
     let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
     let (layout, mut provenance) = (file.map(|file| file.layout()), Vec::new());
     let repeated = repeated_rows(&logs_of(&args.logs), layout.as_ref());
     warnings.extend(repeated.iter().map(ToString::to_string));
     for spec in &args.logs {
-        provenance.push(match &machine {
+        provenance.push(match &setup {
             None => as_it_stands(spec, args, &mut target, &mut warnings, context)?,
-            Some(machine) => of_robot(spec, machine, &mut target, &mut warnings, context)?,
+            Some(setup) => of_robot(spec, setup, &mut target, &mut warnings, context)?,
         });
         bar.advance(1);
     }
@@ -273,7 +273,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         warnings.push(format!("{lost} rows without a time are left out"));
     }
     let recording = LogForm::of(&args.output).is_some_and(LogForm::is_recording);
-    if recording && machine.is_none() {
+    if recording && setup.is_none() {
         for name in &target.columns {
             if let Some(unit) = columns::unit_of_joint(name) {
                 warnings.push(format!(

@@ -77,7 +77,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(inputs, outputs)?;
     let given = files::model(&args.model, context)?;
     let file = &given.value.file;
-    let mut machine = given.value.machine();
+    let mut machine = given.value.setup();
     if args.as_declared {
         machine = machine.as_declared();
     }
@@ -145,7 +145,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let refined = found.model(&machine, file);
     let written = args.output.as_ref().unwrap_or(&args.model);
     let of = stages::diagnose::DiagnoseReport {
-        machine: &machine,
+        setup: &machine,
         file,
         given: &given.provenance,
         found: &found,

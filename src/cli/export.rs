@@ -235,7 +235,7 @@ fn along(args: &Args, given: &GivenModel, context: &Context) -> Result<Option<In
     if args.logs.is_empty() {
         return Ok(None);
     }
-    let machine = given.machine();
+    let machine = given.setup();
     let logs = LogData::read_all(&machine, &logs_of(&args.logs), &[], &context.control)?;
     let whole = identify::read_whole(&machine, &logs, &context.control)?;
     machine.check_temperatures(&given.numbers()?, &logs, &whole.stretches)?;

@@ -9,7 +9,7 @@ use super::{
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{self, Dataset, FrictionSettings, LoggedRobot};
+use cft_ident_stages::identify::{self, Dataset, FrictionSettings, RobotSetup};
 
 const EXAMPLE: &str = "\
 Example:
@@ -56,7 +56,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs.chain(args.setup.fix_setup.as_deref());
     context.check_outputs(paths_of(&args.logs), outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
-    let machine = LoggedRobot::new(&args.robot, robot.value);
+    let machine = RobotSetup::new(&args.robot, robot.value);
     let mut given = vec![robot.provenance];
     let old = args.model.as_deref();
     let old = old.map(|path| files::model_of(path, &machine.file, context));
@@ -70,14 +70,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let data = Dataset::read(&machine, &logs_of(&args.logs), &context.control)?;
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
-    let machine = &checked.setup.data.machine;
+    let machine = &checked.setup.data.setup;
     let mut found = identify::friction(&checked.setup.data, &settings, &context.control)?;
     let setup = &checked.setup;
     setup.put_before(&mut found.setup, &mut found.notes);
     let model = found.model(machine, old.as_ref());
     let document = JsonDocument::new("friction", &found.inputs, &found.notes, &found)?;
     let of = stages::friction::Friction {
-        machine,
+        setup: machine,
         found: &found,
         file: &model,
         path: &typed::quoted(&args.output.to_string_lossy()),

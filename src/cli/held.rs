@@ -11,7 +11,7 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::{LogSpec, Provenance};
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{LoggedRobot, new_model};
+use cft_ident_stages::identify::{RobotSetup, new_model};
 use cft_ident_tool::held::{GravityFit, GravityNumber, HeldError, fit_gravity, read_held};
 
 /// An error by its exit status.
@@ -41,8 +41,8 @@ pub(super) fn run(args: &HeldRun, context: &Context) -> Result<Outcome, CliError
     let name = file_name(Path::new(args.robot));
     let found = fit_gravity(&log, &robot.value, &name).map_err(failed)?;
     context.check()?;
-    let machine = LoggedRobot::new(args.robot, robot.value);
-    let model = model(&found, &machine, &inputs);
+    let setup = RobotSetup::new(args.robot, robot.value);
+    let model = model(&found, &setup, &inputs);
     let path = typed::quoted(&args.output.to_string_lossy());
     let logs = typed::logs(args.logs.iter().map(LogSpec::to_string));
     let mut report = stages::held::held(&found, &path, &logs);
@@ -55,7 +55,7 @@ pub(super) fn run(args: &HeldRun, context: &Context) -> Result<Outcome, CliError
     written(&mut report, args.output);
     let mut warnings = Vec::new();
     for (joint, unsigned) in found.joints.iter().zip(&log.unsigned) {
-        let turns = joint.torque > 0.0 && machine.file.log.sign.is_none();
+        let turns = joint.torque > 0.0 && setup.file.log.sign.is_none();
         if *unsigned && turns && joint.from_below > 0 && joint.from_above > 0 {
             warnings.push(format!(
                 "the torque of {} is never below zero: where its channel has no sign, `sign = \"hang\"` in [log] takes it from the side on which the joint hangs off its command",
@@ -68,11 +68,11 @@ pub(super) fn run(args: &HeldRun, context: &Context) -> Result<Outcome, CliError
 }
 
 /// The model file: gravity's parameters, those that poses do not ask for as 0, friction at rest as Coulomb friction.
-fn model(found: &GravityFit, machine: &LoggedRobot, inputs: &[Provenance]) -> ModelFile {
-    let mut model = new_model(machine, "lsq --static", inputs);
+fn model(found: &GravityFit, setup: &RobotSetup, inputs: &[Provenance]) -> ModelFile {
+    let mut model = new_model(setup, "lsq --static", inputs);
     let file: &mut RobotFile = &mut model.robot;
     file.friction.law = Some(FrictionLawKind::ViscousCoulomb);
-    let robot = machine.robot.clone();
+    let robot = setup.robot.clone();
     for (at, info) in robot.parameters().iter().enumerate() {
         let place = found.kept.iter().position(|kept| *kept == at);
         let known = place.map(|k| &found.parameters[k]);

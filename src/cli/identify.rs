@@ -22,7 +22,7 @@ use cft_ident_report::report::stages;
 use cft_ident_report::report::stages::identify::ShownLogs;
 use cft_ident_stages::identify::{
     self, Dataset, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction,
-    IdentifySettings, Log, LogData, LoggedRobot, StageEnd, Validated,
+    IdentifySettings, Log, LogData, RobotSetup, StageEnd, Validated,
 };
 use cft_ident_stages::replay::ReplayedDiagnosis;
 use cft_ident_stages::setup::Finding;
@@ -94,7 +94,7 @@ struct IdentifyJob {
     campaign: CampaignFile,
     /// Folder from which the campaign names its logs.
     base: PathBuf,
-    machine: LoggedRobot,
+    setup: RobotSetup,
     /// The robot file.
     robot: PathBuf,
     /// Its text, where it was drafted here.
@@ -149,7 +149,7 @@ impl IdentifyJob {
         let robot = resolve(&base, &campaign.robot);
         Ok(Self {
             name: file_name(file),
-            machine: LoggedRobot::load(&robot.to_string_lossy())?,
+            setup: RobotSetup::load(&robot.to_string_lossy())?,
             campaign,
             base,
             robot,
@@ -171,11 +171,11 @@ impl IdentifyJob {
         };
         let (mut robot, mut draft, mut guesses) = (file.to_path_buf(), None, Vec::new());
         let (mut warnings, mut shipped) = (Vec::new(), None);
-        let machine = match is_urdf(file) {
+        let setup = match is_urdf(file) {
             false => {
                 // one that comes with the tool is written beside its model, to be changed there
                 shipped = config::embedded(file).filter(|_| !file.exists());
-                LoggedRobot::load(&file.to_string_lossy())?
+                RobotSetup::load(&file.to_string_lossy())?
             }
             true => {
                 robot = folder.join("robot.toml");
@@ -191,10 +191,10 @@ impl IdentifyJob {
                 guesses = found.guesses();
                 warnings = found.warnings;
                 draft = Some(found.text);
-                LoggedRobot::new(&robot.to_string_lossy(), found.file)
+                RobotSetup::new(&robot.to_string_lossy(), found.file)
             }
         };
-        identify::check_moving(&Dataset::read(&machine, &logs_of(all), &context.control)?.logs)?;
+        identify::check_moving(&Dataset::read(&setup, &logs_of(all), &context.control)?.logs)?;
         let logs = held_out::parted(all);
         if logs.validation.is_empty() {
             let text =
@@ -215,7 +215,7 @@ impl IdentifyJob {
                 },
             },
             base: PathBuf::new(),
-            machine,
+            setup,
             robot,
             draft,
             shipped,
@@ -277,7 +277,7 @@ fn execute(
     }
     let stages = context.stages(&STAGES);
     stages.begin("set-up");
-    let data = Dataset::read(&work.machine, &logs_of(&training), &context.control)?;
+    let data = Dataset::read(&work.setup, &logs_of(&training), &context.control)?;
     let checked = setup::checked(data, (&work.robot, &[]), &with_draft, context)?;
     warnings.extend(checked.setup.notes.iter().map(ToString::to_string));
     match (work.draft, &checked.new_file) {
@@ -294,10 +294,10 @@ fn execute(
         out.write("robot.toml", text)?;
     }
     let known = checked.setup.data;
-    let machine = known.machine.clone();
-    let read = |logs: &[Log]| LogData::read_all(&machine, logs, &[&known.logs], &context.control);
+    let setup = known.setup.clone();
+    let read = |logs: &[Log]| LogData::read_all(&setup, logs, &[&known.logs], &context.control);
     let data = Dataset {
-        machine: machine.clone(),
+        setup: setup.clone(),
         logs: read(&fitted_logs)?,
         one_joint: read(&of_friction)?,
         held_out: read(&logs_of(&unseen))?,
@@ -322,7 +322,7 @@ fn execute(
             StageEnd::Validated(_) => stages.begin("missing effects"),
             StageEnd::Refined(_) => {}
         }
-        keep(end, &machine, &title, &mut out)
+        keep(end, &setup, &title, &mut out)
     })?;
     stages.begin("report");
     warnings.extend(found.notes.iter().map(ToString::to_string));
@@ -330,9 +330,9 @@ fn execute(
     match &found.diagnosed {
         Ok(DiagnoseEnd::DataFault(fault)) => diagnosis = Some(fault.result()),
         Ok(DiagnoseEnd::Diagnosed(diagnosed)) => {
-            diagnosis = Some(diagnosed.result(&machine));
+            diagnosis = Some(diagnosed.result(&setup));
             let refined = found.refined.as_ref().unwrap_or(&found.model);
-            let replayed = ReplayedDiagnosis::new(&machine, diagnosed, refined);
+            let replayed = ReplayedDiagnosis::new(&setup, diagnosed, refined);
             replayed_diagnosis = Some(replayed.map_err(CliError::input)?);
         }
         Err(error) => warnings.push(format!("no diagnosis: {}", CliError::from(error))),
@@ -352,7 +352,7 @@ fn execute(
         false => folder.join(written),
     };
     let of = stages::identify::IdentifyReport {
-        machine: &machine,
+        setup: &setup,
         campaign: &work.name,
         found: &found,
         unseen: &unseen_names,
@@ -367,7 +367,7 @@ fn execute(
     let replayed = match &replayed_diagnosis {
         None if !unseen.is_empty() => {
             let logs = &data.held_out;
-            let smoothed = machine.smoothed_for(logs, &found.numbers, control)?;
+            let smoothed = setup.smoothed_for(logs, &found.numbers, control)?;
             let in_memory = pictures::in_memory(&smoothed, logs, context)?;
             pictures::replayed(&smoothed, in_memory.as_ref(), &unseen_names, numbers, &[])?
         }
@@ -384,14 +384,14 @@ fn execute(
         campaign: &by_names(campaign),
         inputs: &found.inputs,
         warnings: &warnings,
-        quality: &pictures::inspected(all, &machine, context)?,
+        quality: &pictures::inspected(all, &setup, context)?,
         command: &context.command,
     };
     let mut page = report.page();
     stages::identify::pictures(&mut page, &of, shown, &origin);
     context.check()?;
     if let Some(replayed) = &replayed_diagnosis {
-        let picture = residual::figure(&machine, &replayed.residual).svg();
+        let picture = residual::figure(&setup, &replayed.residual).svg();
         out.write("residual.svg", &picture)?;
     }
     out.write("report.html", &report.html())?;
@@ -462,7 +462,7 @@ pub struct StageResults<'a> {
 /// Writes what a stage leaves; `unseen` names the validation logs.
 fn keep(
     end: StageEnd,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     unseen: &str,
     out: &mut StageFolder,
 ) -> Result<(), CliError> {
@@ -471,7 +471,7 @@ fn keep(
             out.write("friction.toml", &model.to_toml()?)?;
             out.write(
                 "friction.svg",
-                &stages::friction::figure(machine, found).svg(),
+                &stages::friction::figure(setup, found).svg(),
             )
         }
         StageEnd::Dynamics(_, model) => out.write("model.toml", &model.to_toml()?),

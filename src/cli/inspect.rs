@@ -18,7 +18,7 @@ use cft_ident_logs::log::{
 use cft_ident_report::report::ReportDetail;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{Dataset, IdentifyError, LogData, LoggedRobot, repeated_rows};
+use cft_ident_stages::identify::{Dataset, IdentifyError, LogData, RobotSetup, repeated_rows};
 use cft_ident_stages::setup::{Finding, SetupReport};
 
 const EXAMPLE: &str = "\
@@ -58,7 +58,7 @@ pub struct InspectionResult {
 
 /// A robot as it was identified.
 struct KnownRobot {
-    machine: LoggedRobot,
+    setup: RobotSetup,
     model: Option<Model>,
 }
 
@@ -68,12 +68,12 @@ impl KnownRobot {
             let name = path.display().to_string();
             let file = ModelFile::load(path)?;
             let model = Some(file.model(&name)?);
-            let machine = LoggedRobot::new(&name, file.robot);
-            return Ok(Some(Self { machine, model }));
+            let setup = RobotSetup::new(&name, file.robot);
+            return Ok(Some(Self { setup, model }));
         }
-        let machine = args.robot.as_deref().map(LoggedRobot::load).transpose()?;
+        let setup = args.robot.as_deref().map(RobotSetup::load).transpose()?;
         let model = None;
-        Ok(machine.map(|machine| Self { machine, model }))
+        Ok(setup.map(|setup| Self { setup, model }))
     }
 }
 
@@ -81,20 +81,20 @@ impl KnownRobot {
 fn looked_at(
     spec: &LogSpec,
     topic: Option<String>,
-    machine: Option<&LoggedRobot>,
+    setup: Option<&RobotSetup>,
     context: &Context,
 ) -> Result<(LogFindings, RawReader), CliError> {
     let section = LogSection {
         topic,
         ..LogSection::default()
     };
-    let open = || match machine {
-        Some(machine) => RawReader::open(spec, Some(&machine.file.layout())),
+    let open = || match setup {
+        Some(setup) => RawReader::open(spec, Some(&setup.file.layout())),
         None => RawReader::open_plain(spec, &section),
     };
     let mut log = open()?;
-    let (mut plan, refused) = match machine {
-        Some(machine) => columns::of_robot(&log, machine),
+    let (mut plan, refused) = match setup {
+        Some(setup) => columns::of_robot(&log, setup),
         None => columns::guessed(&mut log)?,
     };
     let stop = || context.interrupted();
@@ -112,10 +112,10 @@ fn looked_at(
 /// The same by the robot file.
 pub(super) fn findings(
     spec: &LogSpec,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     context: &Context,
 ) -> Result<LogFindings, CliError> {
-    Ok(looked_at(spec, None, Some(machine), context)?.0)
+    Ok(looked_at(spec, None, Some(setup), context)?.0)
 }
 
 /// Looks at one log, and compares it with the model where there is one.
@@ -126,16 +126,16 @@ fn inspect(
     context: &Context,
     warnings: &mut Vec<String>,
 ) -> Result<(LogFindings, Provenance), CliError> {
-    let machine = known.map(|known| &known.machine);
-    let (mut findings, log) = looked_at(spec, topic, machine, context)?;
+    let setup = known.map(|known| &known.setup);
+    let (mut findings, log) = looked_at(spec, topic, setup, context)?;
     let name = escape(&spec.name());
     warnings.extend(log.warnings().iter().map(|text| format!("{name}: {text}")));
     if let Some(KnownRobot {
-        machine,
+        setup,
         model: Some(model),
     }) = known
     {
-        match compare(machine, model, spec, context) {
+        match compare(setup, model, spec, context) {
             Ok(None) => {}
             // A delay by the model is surer than one without it.
             Ok(Some(found)) => {
@@ -156,21 +156,21 @@ fn inspect(
 
 /// Compares the torques of a log with those that a model gives, joints turned and exchanged.
 fn compare(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     model: &Model,
     spec: &LogSpec,
     context: &Context,
 ) -> Result<Option<LogFault>, CliError> {
-    let joints = machine.robot.joint_names();
+    let joints = setup.robot.joint_names();
     let n = joints.len();
     let mut comparison = OrderComparison::new(n);
     let changes = comparison.changes().to_vec();
-    let log = LogData::read(machine, &spec.into(), &context.control)?;
+    let log = LogData::read(setup, &spec.into(), &context.control)?;
     let mut log = log.open(&context.control)?;
     let summary = motion::run(
         &mut |block| log.read(block),
         n,
-        &machine.settings(),
+        &setup.settings(),
         None,
         comparison.channels(),
         &|s, out| {
@@ -264,7 +264,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
     let (mut logs, mut provenance) = (Vec::new(), Vec::new());
     let mut all_topics = Vec::new();
-    let file = known.as_ref().map(|known| &known.machine.file);
+    let file = known.as_ref().map(|known| &known.setup.file);
     let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
     let layout = file.map(|file| file.layout());
     let repeated = repeated_rows(&logs_of(&args.logs), layout.as_ref());
@@ -306,13 +306,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     drop(bar);
     context.check()?;
     let mut report = SetupReport::default();
-    if let Some(KnownRobot {
-        machine,
-        model: None,
-    }) = &known
-    {
+    if let Some(KnownRobot { setup, model: None }) = &known {
         // of logs that cannot be read the findings say why
-        report = match Dataset::read(machine, &logs_of(&args.logs), &context.control) {
+        report = match Dataset::read(setup, &logs_of(&args.logs), &context.control) {
             Ok(data) => setup::report(&data, context)?,
             Err(_) => SetupReport::default(),
         };

@@ -12,7 +12,7 @@ use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{self, Dataset, LoggedRobot, LsqSettings, refined};
+use cft_ident_stages::identify::{self, Dataset, LsqSettings, RobotSetup, refined};
 
 const EXAMPLE: &str = "\
 Example:
@@ -86,7 +86,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs.chain(args.setup.fix_setup.as_deref());
     context.check_outputs(paths_of(&args.logs).chain(payload), outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
-    let machine = LoggedRobot::new(&args.robot, robot.value);
+    let machine = RobotSetup::new(&args.robot, robot.value);
     let mut given = vec![robot.provenance];
     let friction = files::friction("lsq", args.model.as_deref(), &machine.file, context)?;
     given.extend(friction.iter().map(|model| model.provenance.clone()));
@@ -117,7 +117,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &edits), &args.setup, context)?;
     let data = &checked.setup.data;
-    let (machine, logs) = (&data.machine, &data.logs);
+    let (machine, logs) = (&data.setup, &data.logs);
     let mut found = identify::lsq(data, &settings, &context.control)?;
     let setup = &checked.setup;
     setup.put_before(&mut found.setup, &mut found.notes);
@@ -128,7 +128,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let document = JsonDocument::new("lsq", &found.inputs, &found.notes, &found)?;
     let names = names_of(&args.logs);
     let of = stages::lsq::LsqReport {
-        machine,
+        setup: machine,
         found: &found,
         file: &model,
         path: &typed::quoted(&args.output.to_string_lossy()),

@@ -47,7 +47,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = args.output.iter().chain(&args.report).map(|path| &**path);
     context.check_outputs(inputs, outputs)?;
     let given = files::model(&args.model, context)?.value;
-    let data = Dataset::read(&given.machine(), &logs_of(&args.logs), &context.control)?;
+    let data = Dataset::read(&given.setup(), &logs_of(&args.logs), &context.control)?;
     let found = identify::payload(&data, &given, &context.control)?;
     let mut report = report(&found, &names_of(&args.logs).join(", "));
     if found.loaded(&given.file).is_some() {

@@ -11,7 +11,7 @@ use cft_ident_report::report::Report;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::table::{CellAlignment, Table};
 use cft_ident_stages::identify::{
-    self, Dataset, FORMAT, LoggedRobot, MadeWith, ReducedLogs, StageNote,
+    self, Dataset, FORMAT, MadeWith, ReducedLogs, RobotSetup, StageNote,
 };
 use cft_ident_stages::setup::Finding;
 
@@ -81,10 +81,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs::listed(Some(&args.output), &[], args.setup.fix_setup.as_deref());
     context.check_outputs(paths_of(&args.logs), outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
-    let machine = LoggedRobot::new(&args.robot, robot.value);
-    let friction = files::friction("reduce", args.model.as_deref(), &machine.file, context)?;
+    let setup = RobotSetup::new(&args.robot, robot.value);
+    let friction = files::friction("reduce", args.model.as_deref(), &setup.file, context)?;
     let known = friction.as_ref().map(|model| &model.value);
-    let data = Dataset::read(&machine, &logs(&args.logs)?, &context.control)?;
+    let data = Dataset::read(&setup, &logs(&args.logs)?, &context.control)?;
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
     let setup = &checked.setup;

@@ -49,12 +49,12 @@ pub fn checked(
 ) -> Result<CheckedDataset, CliError> {
     let data = match args.as_declared {
         true => Dataset {
-            machine: data.machine.as_declared(),
+            setup: data.setup.as_declared(),
             ..data
         },
         false => data,
     };
-    data.machine.check_gains()?;
+    data.setup.check_gains()?;
     let setup = match accepted_setup(data, &context.control) {
         Ok(setup) => setup,
         Err(SetupRefusal::Interrupted) => return Err(CliError::interrupted()),
@@ -65,7 +65,7 @@ pub fn checked(
     tell_hints(&setup.report, context);
     let path = args.fix_setup.as_ref().filter(|_| !before.is_empty());
     let new_file = path.map(|path| {
-        let text = new_text(robot, before, &setup.data.machine.file, path)?;
+        let text = new_text(robot, before, &setup.data.setup.file, path)?;
         Ok::<_, CliError>((path.clone(), text))
     });
     let new_file = new_file.transpose()?;

@@ -47,11 +47,11 @@ pub struct ShownModel {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs([&*args.model], args.report.as_deref())?;
     let given = files::model(&args.model, context)?;
-    let (model, machine) = (given.value.numbers()?, given.value.machine());
+    let (model, machine) = (given.value.numbers()?, given.value.setup());
     let file = given.value.file;
     let found = in_use(&machine, &file, &model.model);
     let of = stages::show::ShowReport {
-        machine: &machine,
+        setup: &machine,
         file: &file,
         model: &model,
         in_use: found.as_ref(),

@@ -115,7 +115,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(paths_of(&args.logs).chain([&*args.model]), outputs)?;
     let given = files::model(&args.model, context)?;
     let (file, model) = (&given.value.file, given.value.numbers()?);
-    let machine = given.value.machine();
+    let machine = given.value.setup();
     let band = !file.held_out.is_empty();
     let kinds = ["tau", "tau_hat", "residual", "band_lower", "band_upper"];
     let kinds = &kinds[..if band { 5 } else { 3 }];
@@ -165,7 +165,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .collect();
     let next = format!("cft-ident diagnose LOG -m {model_path}{unseen}");
     let of = stages::validate::ValidateReport {
-        machine: &machine,
+        setup: &machine,
         file,
         model: &model,
         logs: &names,

@@ -10,7 +10,7 @@ use cft_ident::effect::formula::{FormulaDefinition, FormulaShape};
 use cft_ident::effect::own;
 use cft_ident::effect::{self, AugmentedModel, EffectPlace, FAULTS, LAWS, Law, ModelEffect};
 use cft_ident::export::{self, Program};
-use cft_ident::identify::{Control, Log, LogData, LoggedRobot, read_whole};
+use cft_ident::identify::{Control, Log, LogData, RobotSetup, read_whole};
 use cft_ident::robot::Robot;
 use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::model::JointFriction;
@@ -224,7 +224,7 @@ fn measured(config: &str, log: &str, effects: &dyn Fn(&Robot) -> Vec<ModelEffect
         return Vec::new();
     };
     let file = RobotFile::parse("robot.toml", config).unwrap();
-    let machine = LoggedRobot::new("robot.toml", file);
+    let machine = RobotSetup::new("robot.toml", file);
     let log = Log::from(
         path.to_string_lossy()
             .parse::<cft_ident::log::LogSpec>()

@@ -7,7 +7,7 @@ use assert_cmd::Command as Tool;
 use cft_ident::config::model_file::{EffectParameter, EffectSection};
 use cft_ident::export::{self, Program};
 use cft_ident::identify::{
-    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, RowSource, WatchSettings, lsq,
+    Control, Dataset, GivenModel, Log, LsqSettings, RobotSetup, RowSource, WatchSettings, lsq,
     watch, watch_recipe,
 };
 use export_support::{note, run, there};
@@ -150,7 +150,7 @@ fn compiled_observers_give_the_lines_of_watch_and_models_without_held_out_data_g
     let path = folder.path();
     let rows = measured(path);
     let (fitted, unseen) = rows.split_at(rows.len() * 7 / 10);
-    let machine = LoggedRobot::load("configs/ur10.toml").unwrap();
+    let machine = RobotSetup::load("configs/ur10.toml").unwrap();
     let logs = [log("fitted", fitted)];
     let found = lsq(
         &Dataset::read(&machine, &logs, &Control::default()).unwrap(),

@@ -5,7 +5,7 @@ use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::config::model_file::{FrictionPrior, Parameter};
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, Dataset, GivenModel, IdentifiedDynamics, Log, LoggedRobot, LsqSettings, lsq, new_model,
+    Control, Dataset, GivenModel, IdentifiedDynamics, Log, LsqSettings, RobotSetup, lsq, new_model,
 };
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::verdict::Verdict;
@@ -20,8 +20,8 @@ const ROBOT: &str = r#"
 const INERTIA: f64 = 3.0;
 const LAW: [f64; 5] = [4.5, 7.0, -2.5, 15.0, 6.0];
 
-fn machine() -> LoggedRobot {
-    LoggedRobot::new("screw.toml", RobotFile::parse("screw.toml", ROBOT).unwrap())
+fn machine() -> RobotSetup {
+    RobotSetup::new("screw.toml", RobotFile::parse("screw.toml", ROBOT).unwrap())
 }
 
 fn chance(seed: u64) -> impl FnMut() -> f64 {

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, Dataset, ErrorKind, GainError, IdentifyError, Log, LoggedRobot, LsqSettings,
-    PayloadLog, fit_gains, lsq,
+    Control, Dataset, ErrorKind, GainError, IdentifyError, Log, LsqSettings, PayloadLog,
+    RobotSetup, fit_gains, lsq,
 };
 use cft_ident::log::LogSpec;
 use currents_arm::{Chance, DECLARED, JOINTS, Payload, log, log_section, plant, robot_file};
@@ -35,9 +35,9 @@ fn logs(folder: &Path, seed: u64, noise: f64) -> ([f64; 4], Payload) {
     (gains, payload)
 }
 
-fn machine(scales: Option<[f64; 4]>) -> LoggedRobot {
+fn machine(scales: Option<[f64; 4]>) -> RobotSetup {
     let text = robot_file(&log_section(scales));
-    LoggedRobot::new("arm.toml", RobotFile::parse("arm.toml", &text).unwrap())
+    RobotSetup::new("arm.toml", RobotFile::parse("arm.toml", &text).unwrap())
 }
 
 fn of(folder: &Path, name: &str) -> Log {
@@ -100,7 +100,7 @@ fn ratios_of_gains_show_without_a_payload_and_leave_the_model_in_amperes() {
         ..LsqSettings::default()
     };
     let fit = lsq(
-        &Dataset::read(&found.machine, &empty, &Control::default()).unwrap(),
+        &Dataset::read(&found.setup, &empty, &Control::default()).unwrap(),
         &settings,
         &Control::default(),
     )
@@ -160,7 +160,7 @@ fn a_joint_whose_channel_has_the_other_sign_is_named() {
         std: 0.0,
     };
     let empty = [of(folder.path(), "empty.csv")];
-    let turned = LoggedRobot::new("arm.toml", file);
+    let turned = RobotSetup::new("arm.toml", file);
     let error = fit_gains(
         &Dataset::read(&turned, &empty, &Control::default()).unwrap(),
         Some(&known),
@@ -322,7 +322,7 @@ fn a_turn_about_the_vertical_shows_no_mass() {
         std: 0.0,
     };
     let empty = [of(folder.path(), "empty.csv")];
-    let turn = LoggedRobot::new("turn.toml", file);
+    let turn = RobotSetup::new("turn.toml", file);
     let error = fit_gains(
         &Dataset::read(&turn, &empty, &Control::default()).unwrap(),
         Some(&known),

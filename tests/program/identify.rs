@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex};
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Dataset, ErrorKind, GivenModel, IdentifiedDynamics, IdentifyError, Log, LoggedRobot,
-    LsqSettings, Progress, ValidateSettings, lsq, validate,
+    Control, Dataset, ErrorKind, GivenModel, IdentifiedDynamics, IdentifyError, Log, LsqSettings,
+    Progress, RobotSetup, ValidateSettings, lsq, validate,
 };
 use cft_ident::log::LogSpec;
 use cft_ident::validate::TorqueErrors;
@@ -19,8 +19,8 @@ const ROBOT: &str = r#"
     friction = { law = "viscous-coulomb", fitted_with_inertias = true }
 "#;
 
-fn robot() -> LoggedRobot {
-    LoggedRobot::new("screw.toml", RobotFile::parse("screw.toml", ROBOT).unwrap())
+fn robot() -> RobotSetup {
+    RobotSetup::new("screw.toml", RobotFile::parse("screw.toml", ROBOT).unwrap())
 }
 
 /// Time, position and force, 8 s at 500 Hz.
@@ -210,7 +210,7 @@ fn torques_of_a_controller_give_what_a_column_of_them_gives_and_its_faults_are_n
         let text =
             format!("{ROBOT}\n[log]\n{torque}\n[log.joint.q1]\nposition = \"x\"\n{columns}\n");
         let file = RobotFile::parse("screw.toml", &text).map_err(|error| error.to_string())?;
-        let robot = LoggedRobot::new("screw.toml", file);
+        let robot = RobotSetup::new("screw.toml", file);
         let log: Log = LogSpec::whole(&path).into();
         let data = Dataset::read(&robot, &[log], &Control::default()).unwrap();
         lsq(&data, &LsqSettings::default(), &Control::default()).map_err(|error| error.to_string())

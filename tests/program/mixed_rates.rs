@@ -2,7 +2,7 @@
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Dataset, DiagnoseEnd, DiagnoseSettings, GivenModel, Log, LoggedRobot, LsqSettings,
+    Control, Dataset, DiagnoseEnd, DiagnoseSettings, GivenModel, Log, LsqSettings, RobotSetup,
     ValidateSettings, compare, diagnose, lsq, validate,
 };
 
@@ -45,13 +45,13 @@ fn slide(name: &str, rate: f64, seed: u64) -> Log {
     Log::of_rows(name, &t, &q, &tau).unwrap()
 }
 
-fn robot() -> LoggedRobot {
+fn robot() -> RobotSetup {
     let text = r#"
         robot = { model = "single-joint", joint = "slide", kind = "prismatic" }
         friction = { law = "viscous-coulomb", fitted_with_inertias = true }
         filter = { cutoff_hz = 20.0, position_cutoff_hz = 80.0 }
     "#;
-    LoggedRobot::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
+    RobotSetup::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
 }
 
 #[test]

@@ -9,7 +9,7 @@ use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::config::model_file::Parameter;
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, Dataset, GivenModel, IdentifiedDynamics, Log, LoggedRobot, LsqSettings, ReducedLogs,
+    Control, Dataset, GivenModel, IdentifiedDynamics, Log, LsqSettings, ReducedLogs, RobotSetup,
     StageNote, ValidateSettings, Validated, lsq, new_model, reduce, validate,
 };
 use cft_ident::log::LogSpec;
@@ -21,12 +21,12 @@ use rand_chacha::ChaCha8Rng;
 
 const LAW: [f64; 5] = [4.5, 7.0, -2.5, 15.0, 6.0];
 
-fn machine(text: &str) -> LoggedRobot {
-    LoggedRobot::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
+fn machine(text: &str) -> RobotSetup {
+    RobotSetup::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
 }
 
 /// A slide whose position cut-off is found from its logs.
-fn slide() -> LoggedRobot {
+fn slide() -> RobotSetup {
     machine(
         r#"
         robot = { model = "single-joint", joint = "slide", kind = "prismatic" }
@@ -63,7 +63,7 @@ fn jump(v: f64) -> f64 {
     30.0 * v + 8.0 * v.signum() + 4.0
 }
 
-fn fitted(machine: &LoggedRobot, logs: &[Log], settings: &LsqSettings) -> IdentifiedDynamics {
+fn fitted(machine: &RobotSetup, logs: &[Log], settings: &LsqSettings) -> IdentifiedDynamics {
     lsq(
         &Dataset::read(machine, logs, &Control::default()).unwrap(),
         settings,
@@ -72,13 +72,13 @@ fn fitted(machine: &LoggedRobot, logs: &[Log], settings: &LsqSettings) -> Identi
     .unwrap()
 }
 
-fn reduced(machine: &LoggedRobot, logs: &[Log], friction: Option<&ModelFile>) -> ReducedLogs {
+fn reduced(machine: &RobotSetup, logs: &[Log], friction: Option<&ModelFile>) -> ReducedLogs {
     let friction = friction.map(|model| GivenModel::new("friction.toml", model.clone()));
     let data = Dataset::read(machine, logs, &Control::default()).unwrap();
     reduce(&data, friction.as_ref(), &Control::default()).unwrap()
 }
 
-fn errors(machine: &LoggedRobot, model: &ModelFile, logs: &[Log]) -> Validated {
+fn errors(machine: &RobotSetup, model: &ModelFile, logs: &[Log]) -> Validated {
     let given = GivenModel::new("model.toml", model.clone());
     let (data, settings) = (
         Dataset::read(machine, logs, &Control::default()).unwrap(),
@@ -365,7 +365,7 @@ fn measured_logs_keep_the_limits_of_size_and_give_the_same_numbers() {
         ("ur10/ur10_exciting.csv@0..15%", "configs/ur10.toml"),
     ] {
         let Some(path) = shared(log) else { continue };
-        let machine = LoggedRobot::load(robot).unwrap();
+        let machine = RobotSetup::load(robot).unwrap();
         let spec: LogSpec = path.to_string_lossy().parse().unwrap();
         let file = PathBuf::from(&spec.path);
         let logs = [Log::from(spec.clone())];

@@ -3,7 +3,7 @@
 
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Dataset, FitNote, GivenModel, Log, LoggedRobot, LsqSettings, StageNote,
+    Control, Dataset, FitNote, GivenModel, Log, LsqSettings, RobotSetup, StageNote,
     ValidateSettings, lsq, read_whole, validate,
 };
 
@@ -61,13 +61,13 @@ fn slide(name: &str, rest: f64, seed: u64) -> Log {
     Log::of_rows(name, &t, &q, &tau).unwrap()
 }
 
-fn robot() -> LoggedRobot {
+fn robot() -> RobotSetup {
     let text = r#"
         robot = { model = "single-joint", joint = "slide", kind = "prismatic" }
         friction = { law = "viscous-coulomb", fitted_with_inertias = true, offset = true }
         filter = { cutoff_hz = 20.0 }
     "#;
-    LoggedRobot::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
+    RobotSetup::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
 }
 
 #[test]

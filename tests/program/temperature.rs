@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use cft_ident::config::RobotFile;
-use cft_ident::identify::{Control, Log, LogData, LoggedRobot, read_whole};
+use cft_ident::identify::{Control, Log, LogData, RobotSetup, read_whole};
 use cft_ident::log::LogSpec;
 use serde_json::Value;
 use serial_arm::{ASKEW, done, run, simulate, write};
@@ -280,7 +280,7 @@ fn a_recording_and_arrays_hold_temperatures_as_a_text_log_does() {
     );
 
     // in memory: the same temperatures beside the same rows
-    let machine = LoggedRobot::new("robot.toml", RobotFile::parse("robot.toml", AXIS).unwrap());
+    let machine = RobotSetup::new("robot.toml", RobotFile::parse("robot.toml", AXIS).unwrap());
     let rows: Vec<Vec<f64>> = fs::read_to_string(at.join("id.csv"))
         .unwrap()
         .lines()

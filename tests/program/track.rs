@@ -8,19 +8,19 @@ use std::path::Path;
 use assert_cmd::Command;
 use cft_ident::config::RobotFile;
 use cft_ident::identify::{
-    Control, Dataset, Log, LoggedRobot, RobotSources, TrackSource, Tracked, reduce, track,
+    Control, Dataset, Log, RobotSetup, RobotSources, TrackSource, Tracked, reduce, track,
 };
 use measured_support::{run, shared};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-fn slide() -> LoggedRobot {
+fn slide() -> RobotSetup {
     let text = r#"
         robot = { model = "single-joint", joint = "slide", kind = "prismatic" }
         friction = { law = "viscous-coulomb", fitted_with_inertias = true, offset = true }
         filter = { cutoff_hz = 20.0, position_cutoff_hz = 80.0 }
     "#;
-    LoggedRobot::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
+    RobotSetup::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
 }
 
 /// A log of 8 s that begins at `from`, of a slide with this Coulomb friction.

@@ -65,14 +65,14 @@ pub fn identify<E: From<IdentifyError>>(
     control: &Control,
     ended: &mut dyn FnMut(StageEnd) -> Result<(), E>,
 ) -> Result<Campaigned, E> {
-    let machine = &data.machine;
+    let setup = &data.setup;
     // a one-joint log may serve both fits, but no log of a fit the validation
     let validation = ("validation", data.held_out.as_slice());
     for (role, fitted) in [
         ("friction", &data.one_joint),
         ("identification", &data.logs),
     ] {
-        each_row_once(machine, &[(role, fitted), validation])?;
+        each_row_once(setup, &[(role, fitted), validation])?;
     }
     let (mut inputs, mut notes) = (Vec::new(), Vec::new());
     let mut keep = |from: &[Provenance], noted: &[StageNote], role: DataRole| {
@@ -82,9 +82,9 @@ pub fn identify<E: From<IdentifyError>>(
     let known = match data.one_joint.as_slice() {
         [] => None,
         some => {
-            let alone = Dataset::new(machine, some);
+            let alone = Dataset::new(setup, some);
             let found = friction(&alone, &FrictionSettings::default(), control)?;
-            let mut model = new_model(machine, "identify", &found.inputs);
+            let mut model = new_model(setup, "identify", &found.inputs);
             found.write_into(&mut model);
             ended(StageEnd::Friction(&found, &model))?;
             keep(&found.inputs, &found.notes, DataRole::Fitted);
@@ -100,27 +100,27 @@ pub fn identify<E: From<IdentifyError>>(
         ..LsqSettings::default()
     };
     let dynamics = lsq(data, &lsq_settings, control)?;
-    let model = dynamics.model(machine, of_friction.map(|given| &given.file));
+    let model = dynamics.model(setup, of_friction.map(|given| &given.file));
     let given = GivenModel::new("model.toml", model);
     ended(StageEnd::Dynamics(&dynamics, &given.file))?;
     keep(&dynamics.inputs, &dynamics.notes, DataRole::Fitted);
     let numbers = given.numbers()?;
     let mut validated = None;
     if !data.held_out.is_empty() {
-        let unseen = Dataset::new(machine, &data.held_out);
+        let unseen = Dataset::new(setup, &data.held_out);
         let settings = ValidateSettings::of(&given);
         let found = validate(&unseen, &settings, control, &mut |_, _| {})?;
         ended(StageEnd::Validated(&found))?;
         keep(&found.inputs, &found.notes, DataRole::HeldOut);
         validated = Some(found);
     }
-    let one_joint = without_rows_of(machine, &data.one_joint, &data.logs);
+    let one_joint = without_rows_of(setup, &data.one_joint, &data.logs);
     let train = [data.logs.as_slice(), &one_joint].concat();
-    let roles = Dataset::new(machine, &train).with_held_out(&data.held_out);
+    let roles = Dataset::new(setup, &train).with_held_out(&data.held_out);
     let diagnosed = diagnose(&roles, &DiagnoseSettings::of(&given), control);
     let refined = match &diagnosed {
         Ok(DiagnoseEnd::Diagnosed(found)) if found.diagnosis.written().next().is_some() => {
-            let refined = found.model(machine, &given.file);
+            let refined = found.model(setup, &given.file);
             ended(StageEnd::Refined(&refined))?;
             Some(refined)
         }

@@ -1,6 +1,6 @@
 //! The stages of an identification as functions of a dataset and a request.
 //!
-//! A [`Dataset`] is a robot as its file describes it ([`LoggedRobot`]) with its logs by what they are for; a [`Log`] is a
+//! A [`Dataset`] is a robot as its file describes it ([`RobotSetup`]) with its logs by what they are for; a [`Log`] is a
 //! file, arrays in memory or a reduced log. Of a file the rows are parsed once and serve every stage. A [`GivenModel`] is
 //! a model file, a [`Control`] the callbacks for progress and cancellation. Each stage returns its result as plain data,
 //! with what it noticed as [`StageNote`]s; it writes nothing. `validate`, `torque` and `watch` hand over single rows as they come.
@@ -72,7 +72,6 @@ pub use crate::input::in_memory::{InMemory, read_whole};
 pub use crate::input::in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use crate::input::log::Log;
 pub use crate::input::log_data::{LogData, check_moving};
-pub use crate::input::logged_robot::{LoggedRobot, narrowed};
 pub use crate::input::model::{new_model, refined, refined_or_friction};
 pub use crate::input::open_log::OpenLog;
 pub use crate::input::passes::SimulatedLoop;
@@ -81,6 +80,7 @@ pub use crate::input::reduced::{
     FORMAT, FrictionGiven, MadeWith, ReducedError, ReducedLog, ReducedLogs, is_reduced,
 };
 pub use crate::input::repeated::repeated_rows;
+pub use crate::input::robot_setup::{RobotSetup, narrowed};
 pub use crate::input::track_error::TrackError;
 pub use crate::input::unknowns::FittedUnknown;
 pub use crate::note::{

@@ -8,11 +8,11 @@
 //!
 //! ```
 //! use cft_ident_files::config::RobotFile;
-//! use cft_ident_stages::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq};
+//! use cft_ident_stages::identify::{Control, Dataset, Log, RobotSetup, LsqSettings, lsq};
 //!
 //! let robot = "robot = { model = \"single-joint\", joint = \"slide\", kind = \"prismatic\" }\n\
 //!     friction = { law = \"viscous-coulomb\", fitted_with_inertias = true }";
-//! let robot = LoggedRobot::new("slide.toml", RobotFile::parse("slide.toml", robot)?);
+//! let robot = RobotSetup::new("slide.toml", RobotFile::parse("slide.toml", robot)?);
 //! // 3 kg, 5 N s/m and 2 N along two sines
 //! let t: Vec<f64> = (0..4000).map(|k| 0.002 * f64::from(k)).collect();
 //! let waves = [(0.1_f64, 2.1_f64), (0.02, 7.3)];

@@ -13,7 +13,7 @@ use crate::input::error::IdentifyError;
 use crate::input::in_use::levers;
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::temperatures;
 use crate::note::{ModelNote, StageNote};
 use crate::observe::{
@@ -107,8 +107,8 @@ pub struct Watched {
 }
 
 /// Filters of an observer: positions of all joints come through one, as external torques were learnt.
-fn processing(machine: &LoggedRobot, excesses: &TorqueExcesses) -> FilterSettings {
-    let settings = machine.settings();
+fn processing(setup: &RobotSetup, excesses: &TorqueExcesses) -> FilterSettings {
+    let settings = setup.settings();
     settings.with_one_position_filter(excesses.position_cutoff_hz)
 }
 
@@ -134,10 +134,10 @@ pub fn watch_recipe(
     per_hour: f64,
 ) -> Result<ObserverRecipe, IdentifyError> {
     let (name, file) = (given.name.as_str(), &given.file);
-    let (machine, refined) = (&given.machine(), &given.numbers()?);
+    let (setup, refined) = (&given.setup(), &given.numbers()?);
     let held = &file.held_out;
     let excesses = learnt(name, held, file.excesses.as_ref())?;
-    let settings = processing(machine, excesses);
+    let settings = processing(setup, excesses);
     let uncertain = Directions::of(file, &refined.model, held);
     let model = (refined, &uncertain);
     recipe(model, &settings, (held, excesses), step_s, per_hour)
@@ -157,7 +157,7 @@ pub fn watch(
     line: &mut dyn FnMut(&WatchLine) -> bool,
 ) -> Result<Watched, IdentifyError> {
     let (name, file) = (given.name.as_str(), &given.file);
-    let (machine, refined) = (&given.machine(), &given.numbers()?);
+    let (setup, refined) = (&given.setup(), &given.numbers()?);
     let (held, mut inputs) = match settings.unloaded {
         [] => (
             Held {
@@ -167,17 +167,17 @@ pub fn watch(
             Vec::new(),
         ),
         logs => {
-            let logs = LogData::read_all(machine, logs, &[], control)?;
-            on_other_logs(machine, (file, refined), &logs, control)?
+            let logs = LogData::read_all(setup, logs, &[], control)?;
+            on_other_logs(setup, (file, refined), &logs, control)?
         }
     };
     let excesses = learnt(name, &held.joints, held.excesses.as_ref())?;
-    let processing = processing(machine, excesses);
+    let processing = processing(setup, excesses);
     let (cutoff, threshold) = (processing.cutoff_hz, excesses.threshold(settings.per_hour));
     let mut observer = Observer::new(refined.clone(), &processing)
         .map_err(|error| IdentifyError::motion(name, error))?
         .with_uncertain(Directions::of(file, &refined.model, &held.joints));
-    let layout = machine.file.layout();
+    let layout = setup.file.layout();
     let takes = refined.takes_temperatures();
     let mut warm = None;
     let (mut reader, of) = match input {
@@ -191,18 +191,18 @@ pub fn watch(
         RowSource::Log(log) => {
             let reader = match json_lines(&log) {
                 Some(file) => Reader::of_stream(&log.name(), file, &layout)?,
-                None => log.reader(&layout, machine.robot.joint_names())?,
+                None => log.reader(&layout, setup.robot.joint_names())?,
             };
             warm = takes.then(|| log.clone());
             (reader, log.name())
         }
     };
-    let mut hold = machine
+    let mut hold = setup
         .file
         .zero_order_hold(reader.layout().channels)
-        .then(|| ZeroOrderHold::new(machine.robot.joints()));
+        .then(|| ZeroOrderHold::new(setup.robot.joints()));
     let mut alarms = AlarmDetector::new(&held.joints, threshold, cutoff);
-    let mut explainer = TorqueExplainer::new(machine.robot.clone(), cutoff);
+    let mut explainer = TorqueExplainer::new(setup.robot.clone(), cutoff);
     let mut over = Vec::new();
     let mut span: Option<[f64; 2]> = None;
     let mut block = Block::default();
@@ -221,12 +221,12 @@ pub fn watch(
             }
         }
         if let Some(hold) = &mut hold {
-            hold.centre(&machine.robot, &mut block);
+            hold.centre(&setup.robot, &mut block);
         }
         let origin = reader.origin();
         // from the first row on it is known where times are counted from
         if let Some(log) = warm.take_if(|_| !block.is_empty()) {
-            observer.set_temperatures(machine.temperatures_along(refined, &log, origin)?);
+            observer.set_temperatures(setup.temperatures_along(refined, &log, origin)?);
         }
         let pushed = observer.push(&block, !more, &mut |o| {
             over.extend(alarms.take(o));
@@ -260,7 +260,7 @@ pub fn watch(
     let middle: Vec<f64> = (held.joints.iter())
         .map(|held| 0.5 * (held.positions_seen[0] + held.positions_seen[1]))
         .collect();
-    let (levers, point) = levers(machine, &middle);
+    let (levers, point) = levers(setup, &middle);
     let names = held.joints.iter().enumerate();
     let joints = names.map(|(j, held)| {
         let sizes = held.external_std.iter();
@@ -268,9 +268,9 @@ pub fn watch(
         let least = sizes.clone().fold(f64::INFINITY, f64::min);
         WatchedJoint {
             joint: held.joint.clone(),
-            unit: machine.file.torque_unit(j).to_owned(),
+            unit: setup.file.torque_unit(j).to_owned(),
             threshold: [least, sizes.fold(0.0, f64::max)],
-            force_n: match machine.robot.joint_kind(j) {
+            force_n: match setup.robot.joint_kind(j) {
                 JointKind::Prismatic => Some(least),
                 JointKind::Revolute => levers[j].map(|lever| least / lever),
             },

@@ -13,7 +13,7 @@ mod study;
 use std::f64::consts::TAU;
 
 use cft_ident::config::RobotFile;
-use cft_ident::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq, reduce};
+use cft_ident::identify::{Control, Dataset, Log, LsqSettings, RobotSetup, lsq, reduce};
 use cft_ident::robot::friction::sign;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -77,7 +77,7 @@ fn chance(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// A log of the model with these parameters: inertial ones, then viscous, Coulomb and offset of each joint.
-fn log(machine: &LoggedRobot, truth: &[f64], case: (f64, f64, f64), seed: u64) -> Log {
+fn log(machine: &RobotSetup, truth: &[f64], case: (f64, f64, f64), seed: u64) -> Log {
     let (rate, seconds, memory) = case;
     let (n, mut draw) = (machine.robot.joints(), chance(seed));
     let shared = truth.len() - 3 * n;
@@ -124,7 +124,7 @@ fn campaign(seed: u64) -> Value {
     let case = |(k, case): (u64, &(&str, f64, usize, f64, f64))| {
         let (name, rate, logs, seconds, memory) = *case;
         let text = if name == "UR10" { UR10 } else { SLIDE };
-        let machine = LoggedRobot::new(name, RobotFile::parse(name, text).expect("a robot file"));
+        let machine = RobotSetup::new(name, RobotFile::parse(name, text).expect("a robot file"));
         let (n, mut draw) = (machine.robot.joints(), chance(1_000 * seed + k));
         let inertial = machine.robot.parameters().len();
         let parameter = |i: usize| match i < inertial {
@@ -149,7 +149,7 @@ fn campaign(seed: u64) -> Value {
 }
 
 /// Intervals of a fit against the parameters that made its logs.
-fn judged(machine: &LoggedRobot, logs: &[Log], truth: &[f64]) -> Value {
+fn judged(machine: &RobotSetup, logs: &[Log], truth: &[f64]) -> Value {
     let (control, settings) = (Control::default(), LsqSettings::default());
     let parts = reduce(
         &Dataset::read(machine, logs, &Control::default()).expect("logs that can be read"),

@@ -20,7 +20,7 @@ use std::path::Path;
 
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
-    Control, Dataset, Log, LogData, LoggedRobot, LsqSettings, PayloadLog, fit_gains, lsq,
+    Control, Dataset, Log, LogData, LsqSettings, PayloadLog, RobotSetup, fit_gains, lsq,
 };
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::accumulate::BlockFactors;
@@ -63,7 +63,7 @@ fn run(seed: u64) -> Value {
         });
     let section = log_section(Some(DECLARED));
     let file = RobotFile::parse("arm.toml", &robot_file(&section)).expect("a robot");
-    let machine = LoggedRobot::new("arm.toml", file);
+    let machine = RobotSetup::new("arm.toml", file);
     let known = PayloadLog {
         log: loaded.clone(),
         mass: given_mass,
@@ -88,7 +88,7 @@ fn run(seed: u64) -> Value {
         ..LsqSettings::default()
     };
     let found = lsq(
-        &Dataset::read(&fitted.machine, &logs, &Control::default()).expect("logs that can be read"),
+        &Dataset::read(&fitted.setup, &logs, &Control::default()).expect("logs that can be read"),
         &settings,
         &control,
     )
@@ -115,7 +115,7 @@ fn run(seed: u64) -> Value {
 
 /// Gains with the channels among the columns of one linear problem: by least squares and by total least
 /// squares, rows weighted by the noise of each joint's channel in the units of the declared gains.
-fn linear(machine: &LoggedRobot, logs: [&Log; 2], mass: f64, control: &Control) -> [Vec<f64>; 2] {
+fn linear(machine: &RobotSetup, logs: [&Log; 2], mass: f64, control: &Control) -> [Vec<f64>; 2] {
     let robot: &Robot = &machine.robot;
     let (n, p) = (robot.joints(), robot.parameters().len());
     let columns = RegressorColumns {

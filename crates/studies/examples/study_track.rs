@@ -16,7 +16,7 @@ mod study;
 use std::ops::Range;
 
 use cft_ident::config::RobotFile;
-use cft_ident::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq, reduce};
+use cft_ident::identify::{Control, Dataset, Log, LsqSettings, RobotSetup, lsq, reduce};
 use cft_ident::track::{LogEstimate, follow_together};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -284,7 +284,7 @@ fn whole_way(seed: u64) -> Vec<f64> {
         filter = { cutoff_hz = 20.0, position_cutoff_hz = 80.0 }
     "#;
     let file = RobotFile::parse("slide.toml", text).expect("a robot file");
-    let machine = LoggedRobot::new("slide.toml", file);
+    let machine = RobotSetup::new("slide.toml", file);
     let truth = [12.0, 30.0, 8.0, 4.0];
     let mut noise = chance(seed + 1_000_000);
     let waves = [(0.11, 1.9), (0.05, 4.7), (0.02, 9.1)];

@@ -12,7 +12,7 @@ use cft_ident_plant::excite::limits::Quantity;
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::strokes::FrictionMemory;
 use cft_ident_plant::excite::{Criterion, ExciteError, InformationBefore, usual_motion};
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 
 /// Samples of a period of the motion that stands for a usual one.
 const SAMPLES_PER_PERIOD: usize = 100;
@@ -146,7 +146,7 @@ pub(super) fn fundamental(machine: &ForeseenRobot) -> f64 {
 
 /// The noise of every joint as the fit of a model left it: its rows are independent at twice the cut-off.
 pub(super) fn noise(model: &ModelFile, rate_hz: f64, machine: &mut ForeseenRobot) {
-    let logged = LoggedRobot::new("", model.robot.clone());
+    let logged = RobotSetup::new("", model.robot.clone());
     let rows = (rate_hz / (2.0 * logged.settings().cutoff_hz)).max(1.0);
     let names = machine.model.robot.joint_names();
     for (noise, name) in machine.noise.iter_mut().zip(names) {

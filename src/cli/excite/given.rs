@@ -11,7 +11,7 @@ use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{LogError, LogSpec};
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::{GivenInformation, Motion, foresee};
-use cft_ident_stages::identify::{IdentifyError, Log, LogData, LoggedRobot};
+use cft_ident_stages::identify::{IdentifyError, Log, LogData, RobotSetup};
 
 /// Share of a joint's usual torque that its noise is taken for, where the robot file does not say.
 const NOISE_SHARE: f64 = 0.01;
@@ -54,7 +54,7 @@ pub(super) fn add(
     let spec: LogSpec = name.parse().map_err(|error: LogError| {
         CliError::usage(error.explanation().of(format!("--with {name}")))
     })?;
-    let logs = LoggedRobot::new(name, bench.file.clone());
+    let logs = RobotSetup::new(name, bench.file.clone());
     let control = &bench.context.control;
     let log = LogData::read_positions(&logs, &Log::from(&spec), control)?;
     let mut log = log.open(control)?;

@@ -10,7 +10,7 @@ use cft_ident_plant::excite::ladder::{LadderTask, design_ladder};
 use cft_ident_plant::excite::strokes::{StrokesTask, design_strokes};
 use cft_ident_plant::excite::{LawForeseen, Motion};
 use cft_ident_report::report::json::JsonDocument;
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 
 pub(super) fn ladder_task(bench: &ExciteRun, joint: &str) -> LadderTask {
     let (seconds, part) = match &bench.aim {
@@ -38,7 +38,7 @@ pub(super) fn strokes(bench: &ExciteRun, names: &OutputNames) -> Result<Outcome,
     else {
         return Err(CliError::usage("no effect with a memory is named"));
     };
-    let logged = LoggedRobot::new("", bench.file.clone());
+    let logged = RobotSetup::new("", bench.file.clone());
     let task = StrokesTask {
         joint: joint.clone(),
         effect: *effect,

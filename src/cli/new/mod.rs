@@ -20,7 +20,7 @@ use cft_ident_logs::mapping::{
 use cft_ident_plant::excite::space::always_touching;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::table::{CellAlignment, Table, hanging};
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 use text::DraftInputs;
 
 const EXAMPLE: &str = "\
@@ -129,8 +129,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             let text = "the log cannot be read with this file yet";
             warnings.push(format!("{text}: {error}; correct [log] in {place}"));
         } else {
-            let machine = LoggedRobot::new(&target.to_string_lossy(), found.file);
-            faults = Some(inspect::findings(spec, &machine, context)?.faults);
+            let setup = RobotSetup::new(&target.to_string_lossy(), found.file);
+            faults = Some(inspect::findings(spec, &setup, context)?.faults);
         }
     }
     context.write_text(&target, &found.text)?;

@@ -7,7 +7,7 @@ use super::columns::choose;
 use super::content::FileContent;
 use super::delayed::DelayedRows;
 use super::layout::Layout;
-use super::recording::{
+use super::messages::{
     JoinedTopics, JointStates, MessageRows, format_of, has_none, of_joints, of_topics,
 };
 use super::rows::{LogRows, RowStrictness};

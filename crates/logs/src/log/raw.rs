@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use super::columns::{time_of, unit_of};
 use super::content::FileContent;
 use super::layout::{Channel, Layout};
+use super::messages::{self, StateGroup, TopicFacts, format_of, state_groups};
 use super::pass::LogPass;
-use super::recording::{self, StateGroup, TopicFacts, format_of, state_groups};
 use super::rows::{RowStrictness, counted};
 use super::source::Provenance;
 use super::time::Instant;
@@ -22,7 +22,7 @@ pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
 
 /// The topics of a recording, with the numbers in their messages; none of a text log.
 pub fn listing(spec: &LogSpec) -> Result<Vec<TopicFacts>, LogError> {
-    of_recording(spec, recording::listing)
+    of_recording(spec, messages::listing)
 }
 
 /// Looks at a recording, of which an empty part is of no format; nothing of any other log.

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::LogError;
+use super::messages::FORMATS;
 use super::names::escape_whole;
-use super::recording::FORMATS;
 use super::source::{self, failed, file_name, shown};
 use super::table::dataset;
 

@@ -4,7 +4,7 @@ use super::check_setup::check_setup_where_possible;
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{SetupNote, StageNote};
 use crate::setup::{Finding, FindingSeverity, SetupReport};
 use cft_ident_files::config::RobotFile;
@@ -96,7 +96,7 @@ impl ContradictedSetup {
                 finding: Box::new(finding.clone()),
             })
         });
-        let corrected = LoggedRobot::new(file, corrected);
+        let corrected = RobotSetup::new(file, corrected);
         Ok(AcceptedSetup {
             notes: self.notes.iter().cloned().chain(right).collect(),
             data: self.data.of_robot(corrected, control)?,

@@ -16,7 +16,7 @@ use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::setup_file::ChannelTables;
 use crate::input::unknowns::columns;
 use cft_ident_files::config::RobotFile;
@@ -51,11 +51,11 @@ pub fn check_setup_where_possible(
 /// Checks the set-up by logs of several joints or of one; friction is fitted with it, whatever is known of it. Reduced
 /// logs are passed over: they hold no rows to look at, and were checked when they were made.
 pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, IdentifyError> {
-    let (machine, logs) = (&data.machine, data.logs.as_slice());
-    if machine.as_declared {
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
+    if setup.as_declared {
         return Ok(CheckedSetup::default());
     }
-    let findings = gains::findings(machine);
+    let findings = gains::findings(setup);
     if !findings.is_empty() {
         // gains that differ look like signs, scales and loads
         return Ok(CheckedSetup {
@@ -66,27 +66,27 @@ pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, Id
             ..CheckedSetup::default()
         });
     }
-    let (channels, sample) = sampled(machine, logs, control)?;
+    let (channels, sample) = sampled(setup, logs, control)?;
     let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {
-        let mut file = machine.file.clone();
+        let mut file = setup.file.clone();
         file.robot.gravity = Some(gravity);
         Some(file.robot())
     };
-    let columns = columns(machine, None);
+    let columns = columns(setup, None);
     let problem = Problem::new(
-        &machine.robot,
-        (machine.file.declares_gravity())
+        &setup.robot,
+        (setup.file.declares_gravity())
             .then_some(&in_gravity as &(dyn Fn([f64; 3]) -> Option<Robot> + Sync)),
         (channels, &columns),
         sample,
-        known(machine),
+        known(setup),
     );
     let searched = search(&problem, &|| control.stopped());
     control.check()?;
     let mut found = checked(data, &problem, &searched, control)?;
     // a limit that leaves too little to fit is not taken
     if let Some(limited) = &found.limited
-        && sampled(&limited.machine, &limited.logs, control).is_err()
+        && sampled(&limited.setup, &limited.logs, control).is_err()
     {
         control.check()?;
         found.limited = None;
@@ -96,8 +96,8 @@ pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, Id
 }
 
 /// What the robot file knows beside its channels.
-fn known(machine: &LoggedRobot) -> KnownBeforehand {
-    let file = &machine.file;
+fn known(setup: &RobotSetup) -> KnownBeforehand {
+    let file = &setup.file;
     let links = file.robot.link.iter();
     let bodies: Vec<Option<[f64; 10]>> = links
         .map(|link| Some(link.inertial.as_ref()?.body().standard()))
@@ -107,7 +107,7 @@ fn known(machine: &LoggedRobot) -> KnownBeforehand {
         let of = file.log.joint.get(name);
         of.map_or([None; 2], |c| [c.position_scale, c.torque_scale])
     };
-    let names = machine.robot.joint_names();
+    let names = setup.robot.joint_names();
     let gears = file.log.gears.iter().flatten().copied();
     let written = names.iter().flat_map(scales).flatten().chain(gears);
     let either = |x: f64| [x.abs(), x.abs().recip()];
@@ -122,25 +122,25 @@ fn known(machine: &LoggedRobot) -> KnownBeforehand {
             .filter(|x| x.is_finite() && *x > 1.0)
             .collect(),
         inertial: weighs.then(|| {
-            let mut standard = vec![0.0; machine.robot.standard_parameters()];
+            let mut standard = vec![0.0; setup.robot.standard_parameters()];
             let of = (bodies.iter()).flat_map(|body| body.unwrap_or_default());
             standard.iter_mut().zip(of).for_each(|(to, x)| *to = x);
-            machine.robot.base_of(&standard)
+            setup.robot.base_of(&standard)
         }),
     }
 }
 
 /// A bounded number of rows of logs, as the robot file declares them.
 fn sampled(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     logs: &[LogData],
     control: &Control,
 ) -> Result<(Channels, Sample), IdentifyError> {
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     let settings = FilterSettings {
         // signs of the speed are off by half a sample at most, which is no matter here
         thin: true,
-        ..machine.settings()
+        ..setup.settings()
     };
     let _work = control.begin("checking the set-up", None);
     let mut thinner = Thinner::new(n);
@@ -148,7 +148,7 @@ fn sampled(
     let whole = logs.iter().filter(|log| log.reduced().is_none());
     for (index, log) in whole.enumerate() {
         let mut open = log.open(control)?;
-        let of_log = channels_of(machine, log, open.layout());
+        let of_log = channels_of(setup, log, open.layout());
         if of_log.drive == Drive::Motors {
             // positions that belong to no pose are what is looked for
             open = log.open_channels(control)?;
@@ -181,8 +181,8 @@ fn checked(
     searched: &Searched,
     control: &Control,
 ) -> Result<CheckedSetup, IdentifyError> {
-    let machine = &data.machine;
-    let declared = ChannelTables::new(&machine.file, problem.channels.drive == Drive::Motors);
+    let setup = &data.setup;
+    let declared = ChannelTables::new(&setup.file, problem.channels.drive == Drive::Motors);
     let edits = searched.correction.as_ref().map(|by| declared.edits(by));
     let edits = edits.unwrap_or_default();
     // what no line mends is refused and not put right
@@ -190,14 +190,14 @@ fn checked(
         .correction
         .as_ref()
         .filter(|by| by.begins.iter().all(Option::is_none));
-    let report = setup_words::report(machine, problem, searched);
+    let report = setup_words::report(setup, problem, searched);
     let limited = (!report.torque_limits.is_empty()).then(|| {
-        let mut file = machine.file.clone();
+        let mut file = setup.file.clone();
         for of in &report.torque_limits {
             let own = file.log.joint.entry(of.joint.clone()).or_default();
             own.torque_limit = Some(of.limit);
         }
-        data.of_robot(LoggedRobot::new(&machine.name, file), control)
+        data.of_robot(RobotSetup::new(&setup.name, file), control)
     });
     Ok(CheckedSetup {
         limited: limited.transpose()?,
@@ -208,22 +208,22 @@ fn checked(
 }
 
 /// The channels of a log as the robot file declares them.
-fn channels_of(machine: &LoggedRobot, log: &LogData, layout: &Layout) -> Channels {
-    let n = machine.robot.joints();
+fn channels_of(setup: &RobotSetup, log: &LogData, layout: &Layout) -> Channels {
+    let n = setup.robot.joints();
     if matches!(log.source(), Log::Arrays(_)) {
         return Channels::of_joints(n);
     }
-    let gears = machine.file.gear_matrix();
+    let gears = setup.file.gear_matrix();
     let gears = gears.and_then(|r| Some((r.clone().try_inverse()?, r)));
     let drive = match (layout.channels, gears) {
         (Logged::Actuator, _) => Drive::Motors,
         (Logged::Joint, Some((inverse, r))) => Drive::Gears(r, inverse),
         (Logged::Joint, None) => Drive::Joints,
     };
-    let joint = |name: &String| machine.file.log.joint.get(name);
+    let joint = |name: &String| setup.file.log.joint.get(name);
     let offsets = match drive {
         // behind gears they belong to the joints
-        Drive::Gears(..) => machine
+        Drive::Gears(..) => setup
             .robot
             .joint_names()
             .iter()

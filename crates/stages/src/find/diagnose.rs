@@ -18,10 +18,10 @@ use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::{InMemory, read_each};
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::{own_laws, refined};
 use crate::input::position_cutoff::known;
 use crate::input::repeated::each_row_once;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::temperatures;
 use crate::note::StageNote;
 use crate::open_loop::FreeRun;
@@ -118,8 +118,8 @@ impl<'a> DiagnoseSettings<'a> {
     ///
     /// # Errors
     /// Formulas that are none on this robot, and a name that the model has for another effect.
-    pub fn check_candidates(&self, machine: &LoggedRobot) -> Result<(), IdentifyError> {
-        own_laws(&self.candidates, &machine.robot)?;
+    pub fn check_candidates(&self, setup: &RobotSetup) -> Result<(), IdentifyError> {
+        own_laws(&self.candidates, &setup.robot)?;
         let other = |own: &&CandidateSection| {
             let mut known = self.model.file.candidates.iter();
             known.any(|known| known.name == own.name && known != *own)
@@ -143,13 +143,13 @@ pub fn diagnose(
     settings: &DiagnoseSettings,
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
-    let machine = &data.machine;
+    let setup = &data.setup;
     let (name, as_given) = (settings.model.name.as_str(), &settings.model.file);
     // what is looked for stands beside the plain fit
     let plain = as_given.as_fitted();
     let file = &plain;
     let given = refined(file, name)?;
-    settings.check_candidates(machine)?;
+    settings.check_candidates(setup)?;
     let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
     let mut judged = file.parameters.iter().filter(judged).peekable();
     let determined = |p: &Parameter| matches!(p.verdict, Some(Verdict::Identified | Verdict::Weak));
@@ -158,10 +158,10 @@ pub fn diagnose(
             model: name.to_owned(),
         });
     }
-    if let Some(fault) = without_gains(machine).or(refused(&data.logs)?) {
+    if let Some(fault) = without_gains(setup).or(refused(&data.logs)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
-    each_row_once(machine, &[("fit", &data.logs), ("holdout", &data.held_out)])?;
+    each_row_once(setup, &[("fit", &data.logs), ("holdout", &data.held_out)])?;
     let groups = [
         (&data.logs, LogRole::Train),
         (&data.held_out, LogRole::Holdout),
@@ -170,18 +170,18 @@ pub fn diagnose(
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [&*data.logs, &data.held_out].concat();
     let laws = known(&given.model);
-    let together = machine.with_position_cutoffs(&all, &laws, control)?;
-    let each = machine.settings_of_each(&all, &laws, &together, control)?;
-    let machine = &together;
-    let mut in_memory = read_each(machine, &each, &all, control)?;
-    let contact = contacts(machine, &data.logs, control)?;
+    let together = setup.with_position_cutoffs(&all, &laws, control)?;
+    let each = setup.settings_of_each(&all, &laws, &together, control)?;
+    let setup = &together;
+    let mut in_memory = read_each(setup, &each, &all, control)?;
+    let contact = contacts(setup, &data.logs, control)?;
     in_memory.notes.splice(0..0, contact.iter().cloned());
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
         &settings.candidates,
-        &machine.robot,
+        &setup.robot,
     )?));
-    machine.check_taken(&taken, &all, &in_memory.stretches)?;
+    setup.check_taken(&taken, &all, &in_memory.stretches)?;
     let fitted = match settings.keep {
         true => &[],
         false => &in_memory.inputs[..data.logs.len()],
@@ -198,7 +198,7 @@ pub fn diagnose(
         });
     }
     let mut case = case(
-        machine,
+        setup,
         (name, file, &before),
         given,
         &mut in_memory,
@@ -224,7 +224,7 @@ pub fn diagnose(
     );
     let unknowns = case.unknowns();
     let refitting = OwnRefit {
-        machine: &data.machine,
+        setup: &data.setup,
         given: settings.model,
         logs: &data.logs,
         stretches: &case.stretches,
@@ -292,9 +292,9 @@ pub fn diagnose(
             found.held.excesses.clone_from(&fitted.excesses);
         }
         Some(_) => {
-            let refined = found.model(machine, as_given);
+            let refined = found.model(setup, as_given);
             let tried = hold_out(
-                machine,
+                setup,
                 (&refined, &found.diagnosis.in_use),
                 (&data.logs, &found.in_memory.inputs),
                 control,
@@ -304,7 +304,7 @@ pub fn diagnose(
         None => {}
     }
     let _work = control.begin("free run", None);
-    found.free_run = found.run_freely(machine, (name, as_given))?;
+    found.free_run = found.run_freely(setup, (name, as_given))?;
     let spoiled = found.free_run.as_ref().and_then(spoiled);
     found.in_memory.notes.extend(spoiled);
     Ok(DiagnoseEnd::Diagnosed(Box::new(found)))
@@ -315,8 +315,8 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Channels that are no torques, as a fault: gains that differ look like friction and loads.
-fn without_gains(machine: &LoggedRobot) -> Option<DataFault> {
-    let problem = machine.check_gains().err()?.explanation();
+fn without_gains(setup: &RobotSetup) -> Option<DataFault> {
+    let problem = setup.check_gains().err()?.explanation();
     Some(DataFault {
         kind: "gains".to_owned(),
         channel: Some("torque".to_owned()),
@@ -345,17 +345,17 @@ const HELD_FIRMNESS: f64 = 1e6;
 
 /// What the search is about; `before` is the model with the friction that is known without these logs.
 fn case(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     (name, file, before): (&str, &ModelFile, &ModelFile),
     given: AugmentedModel,
     in_memory: &mut InMemory,
     (roles, settings): (Vec<LogRole>, &DiagnoseSettings),
 ) -> Result<DiagnosisCase, IdentifyError> {
-    let processing = machine.settings();
+    let processing = setup.settings();
     let filters = ParallelFilters::design(&processing, &in_memory.stretches)
         .map_err(|error| IdentifyError::motion(name, error))?;
     let hold = settings.hold_friction;
-    let open = open(machine, file, &given, hold);
+    let open = open(setup, file, &given, hold);
     let rate = filters.row_rate_hz();
     let alone = moved_alone(&given, &in_memory.stretches, &roles);
     // what is held is known so many times better than these data can say; its own spread stays that of its covariance
@@ -381,13 +381,13 @@ fn case(
         filters,
         cutoff_hz: processing.cutoff_hz,
         rest_speed: in_memory.rest_speed.clone(),
-        drives: drives(machine),
-        units: (0..machine.robot.joints())
-            .map(|j| machine.file.torque_unit(j).to_owned())
+        drives: drives(setup),
+        units: (0..setup.robot.joints())
+            .map(|j| setup.file.torque_unit(j).to_owned())
             .collect(),
         averaged: in_memory.averaged,
         kept,
-        own: own_laws(&settings.candidates, &machine.robot)?,
+        own: own_laws(&settings.candidates, &setup.robot)?,
         wishes: settings.wishes.clone(),
         numbers: NUMBERS,
         formula: FORMULA_NUMBERS,
@@ -395,9 +395,9 @@ fn case(
 }
 
 /// The drives that the robot file declares, joint by joint.
-fn drives(machine: &LoggedRobot) -> Vec<JointDrive> {
-    let names = machine.robot.joint_names().iter();
-    let declared = names.map(|name| machine.file.drive.get(name).cloned());
+fn drives(setup: &RobotSetup) -> Vec<JointDrive> {
+    let names = setup.robot.joint_names().iter();
+    let declared = names.map(|name| setup.file.drive.get(name).cloned());
     declared.map(Option::unwrap_or_default).collect()
 }
 

@@ -11,7 +11,7 @@ use super::formulas::{
     values_found,
 };
 use super::next_motion::separating_command;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
@@ -265,9 +265,9 @@ impl Diagnosed {
     }
 
     /// The diagnosis as a document holds it.
-    pub fn result(&self, machine: &LoggedRobot) -> DiagnosisResult {
+    pub fn result(&self, setup: &RobotSetup) -> DiagnosisResult {
         let d = &self.diagnosis;
-        let names = machine.robot.joint_names();
+        let names = setup.robot.joint_names();
         let unexplained = &d.left.unexplained;
         let left = unexplained
             .iter()
@@ -290,12 +290,12 @@ impl Diagnosed {
             by: c.by,
             certainty: c.certainty,
         };
-        let found = d.steps.iter().map(|s| found_candidate(machine, s));
-        let others = d.candidates.iter().map(|c| candidate(machine, c));
+        let found = d.steps.iter().map(|s| found_candidate(setup, s));
+        let others = d.candidates.iter().map(|c| candidate(setup, c));
         DiagnosisResult {
             verdict: self.verdict(),
             headline: Some(self.headline()),
-            steps: d.steps.iter().map(|s| self.step(machine, s)).collect(),
+            steps: d.steps.iter().map(|s| self.step(setup, s)).collect(),
             before: Some(d.before.clone()),
             after: Some(d.after.clone()),
             written: d.selected.clone(),
@@ -316,7 +316,7 @@ impl Diagnosed {
                 .collect(),
             formulas: self.searched.then(|| {
                 let all = d.formulas.iter();
-                all.map(|f| formula_result(machine, f)).collect()
+                all.map(|f| formula_result(setup, f)).collect()
             }),
             candidates: found.chain(others).collect(),
             set_aside: Some(aside.collect()),
@@ -326,8 +326,8 @@ impl Diagnosed {
         }
     }
 
-    fn step(&self, machine: &LoggedRobot, step: &FoundEffect) -> DiagnosisStep {
-        let robot = &machine.robot;
+    fn step(&self, setup: &RobotSetup, step: &FoundEffect) -> DiagnosisStep {
+        let robot = &setup.robot;
         let effect = &step.estimate;
         let alternatives: Vec<&str> = step.alternatives.iter().map(|c| c.name()).collect();
         let alike = !alternatives.is_empty();
@@ -339,7 +339,7 @@ impl Diagnosed {
             effect: effect.name(),
             family: effect.family().name(),
             joint: effect.place.name(robot),
-            parameters: values_found(numbers_of(machine, step)).collect(),
+            parameters: values_found(numbers_of(setup, step)).collect(),
             alternatives,
             status: step.status,
             written: step.written.is_some(),
@@ -349,7 +349,7 @@ impl Diagnosed {
             torque: EffectValueFound {
                 value: step.torque[0],
                 std: Some(step.torque[1]),
-                unit: machine
+                unit: setup
                     .file
                     .torque_unit(effect.place.joint().unwrap_or(0))
                     .to_owned(),
@@ -401,7 +401,7 @@ pub fn signal_words(names: &[String], own: usize, signal: Signal) -> String {
     }
 }
 
-fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult {
+fn found_candidate(setup: &RobotSetup, step: &FoundEffect) -> CandidateResult {
     let reason = match step.left {
         None => "",
         Some(NotWritten::HeldOut) => "held-out data are worse with it",
@@ -411,7 +411,7 @@ fn found_candidate(machine: &LoggedRobot, step: &FoundEffect) -> CandidateResult
     };
     CandidateResult {
         effect: step.estimate.name(),
-        joint: step.estimate.place.name(&machine.robot),
+        joint: step.estimate.place.name(&setup.robot),
         family: step.estimate.family().name(),
         score: Some(step.share),
         accepted: step.written.is_some(),
@@ -427,14 +427,14 @@ pub fn accept_option(effect: &ModelEffect, robot: &Robot) -> String {
     }
 }
 
-fn candidate(machine: &LoggedRobot, c: &LeftCandidate) -> CandidateResult {
+fn candidate(setup: &RobotSetup, c: &LeftCandidate) -> CandidateResult {
     let family = c
         .effect
         .as_ref()
         .map_or(c.law.entry.family(), |e| e.family());
     CandidateResult {
         effect: c.law.entry.name,
-        joint: c.place.name(&machine.robot),
+        joint: c.place.name(&setup.robot),
         family: family.name(),
         score: c.score,
         accepted: false,

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::diagnose::Diagnosed;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::diagnose::{
     FormulaEnd, FormulaSymmetry, FoundEffect, FoundFormula, JointChange,
 };
@@ -64,10 +64,10 @@ pub(crate) fn gain_of_each(names: &[String], gain: &ErrorGain) -> Vec<JointGain>
 }
 
 /// Estimated parameters of an effect with units and standard deviations.
-pub fn numbers_of(machine: &LoggedRobot, step: &FoundEffect) -> Vec<EffectNumber> {
+pub fn numbers_of(setup: &RobotSetup, step: &FoundEffect) -> Vec<EffectNumber> {
     let effect = &step.estimate;
-    let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
-    effect.numbers(&machine.robot, unit, Some(&step.covariance))
+    let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+    effect.numbers(&setup.robot, unit, Some(&step.covariance))
 }
 
 /// The formula of what is left of a joint.
@@ -135,9 +135,9 @@ pub(crate) fn written_sections(found: &Diagnosed) -> Vec<CandidateSection> {
 }
 
 /// A formula in words and numbers.
-pub fn formula_result(machine: &LoggedRobot, found: &FoundFormula) -> FormulaResult {
-    let names = machine.robot.joint_names();
-    let numbers = numbers_of(machine, &found.step);
+pub fn formula_result(setup: &RobotSetup, found: &FoundFormula) -> FormulaResult {
+    let names = setup.robot.joint_names();
+    let numbers = numbers_of(setup, &found.step);
     let signals = found.signals.iter();
     FormulaResult {
         joint: names[found.joint].clone(),

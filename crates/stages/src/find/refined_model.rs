@@ -4,8 +4,8 @@ use super::diagnose::Diagnosed;
 use super::formulas::{numbers_of, written_sections};
 use crate::held_out::open_loop::{is_in_si, whole};
 use crate::input::error::IdentifyError;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::{in_file, new_model, refined};
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknown_key::key_of;
 use crate::open_loop::{FreeRun, RunSpan, free_run};
 use cft_ident_core::diagnose::{Unknown, value_of};
@@ -20,10 +20,10 @@ impl Diagnosed {
     /// The free run of the model given and of the one that is written, with the parameters in use.
     pub(crate) fn run_freely(
         &self,
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         (name, given): (&str, &ModelFile),
     ) -> Result<Option<FreeRun>, IdentifyError> {
-        if !is_in_si(machine) {
+        if !is_in_si(setup) {
             return Ok(None);
         }
         let before = refined(given, name)?;
@@ -59,11 +59,11 @@ impl Diagnosed {
     }
 
     /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
-    pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
+    pub fn model(&self, setup: &RobotSetup, file: &ModelFile) -> ModelFile {
         let Some(fitted) = &self.fitted else {
             return file.clone();
         };
-        let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
+        let mut model = new_model(setup, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&fitted.parameters);
         model.covariance.clone_from(&fitted.covariance);
         model.residual_std.clone_from(&fitted.residual_std);
@@ -72,9 +72,9 @@ impl Diagnosed {
         model.friction_prior.clone_from(&self.friction_prior);
         match self.by_lsq {
             true => self.put_deviations_of_lsq(file, &mut model),
-            false => self.put_deviations(machine, file, &mut model),
+            false => self.put_deviations(setup, file, &mut model),
         }
-        self.put_effects(machine, file, &mut model);
+        self.put_effects(setup, file, &mut model);
         let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
         let formulas = written_sections(self);
         let known = file.candidates.iter().chain(&self.candidates);
@@ -141,7 +141,7 @@ impl Diagnosed {
     }
 
     /// Deviations of numbers by the judge's sums: those of the joint fit.
-    fn put_deviations(&self, machine: &LoggedRobot, file: &ModelFile, model: &mut ModelFile) {
+    fn put_deviations(&self, setup: &RobotSetup, file: &ModelFile, model: &mut ModelFile) {
         let diagnosis = &self.diagnosis;
         // beside a part of an effect the declared numbers take up the rest, and are no estimates
         let whole = self.is_whole();
@@ -190,7 +190,7 @@ impl Diagnosed {
         model.replace_covariance(&keys, &|a, b| {
             widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
         });
-        let joints = machine.robot.joint_names().iter();
+        let joints = setup.robot.joint_names().iter();
         for (joint, std) in joints.zip(&diagnosis.residual_std) {
             model.residual_std.insert(joint.clone(), *std);
         }
@@ -217,7 +217,7 @@ impl Diagnosed {
     }
 
     /// Effects that the given model had, and those that were found.
-    fn put_effects(&self, machine: &LoggedRobot, file: &ModelFile, model: &mut ModelFile) {
+    fn put_effects(&self, setup: &RobotSetup, file: &ModelFile, model: &mut ModelFile) {
         model.effects.clone_from(&file.effects);
         model.estimates.extend(file.estimates.iter().cloned());
         for step in self.diagnosis.written() {
@@ -227,14 +227,14 @@ impl Diagnosed {
             else {
                 continue;
             };
-            let estimated = numbers_of(machine, step);
+            let estimated = numbers_of(setup, step);
             let whole = effect.linear == step.estimate.linear;
-            let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+            let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
             let numbers = match whole {
                 true => estimated.clone(),
-                false => effect.numbers(&machine.robot, unit, None),
+                false => effect.numbers(&setup.robot, unit, None),
             };
-            let mut section = in_file(effect, machine, &numbers);
+            let mut section = in_file(effect, setup, &numbers);
             section.accepted_by_user = step.accepted_by_user;
             if !whole {
                 section.shrinkage = Some(step.shrinkage);

@@ -2,7 +2,7 @@
 
 mod weights;
 
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::setup_file::ChannelTables;
 use crate::setup::{
     Alternative, Cause, Change, ChannelKind, Correction, DecidedBy, Drive, Finding, FindingKind,
@@ -13,14 +13,14 @@ use ChannelKind::{Position, Torque};
 use cft_ident_core::number::{percent, significant};
 
 /// The entries of the key `setup`, and the joints whose friction drives them.
-pub(crate) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> SetupReport {
+pub(crate) fn report(setup: &RobotSetup, problem: &Problem, searched: &Searched) -> SetupReport {
     let motors = problem.channels.drive == Drive::Motors;
-    let declared = ChannelTables::new(&machine.file, motors);
+    let declared = ChannelTables::new(&setup.file, motors);
     let words = SetupWords {
-        joints: machine.robot.joint_names(),
+        joints: setup.robot.joint_names(),
         names: declared.names(),
         declared,
-        gravity: machine.robot.tree().gravity(),
+        gravity: setup.robot.tree().gravity(),
     };
     let found = searched.found.iter();
     let mut findings: Vec<Finding> = found.flat_map(|found| words.findings(found)).collect();
@@ -34,7 +34,7 @@ pub(crate) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Search
         joint: words.joints[driven.joint].clone(),
         power: driven.power,
         std: driven.std,
-        unit: power_unit(machine, driven.joint),
+        unit: power_unit(setup, driven.joint),
         cause: "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine".to_owned(),
     }
     };
@@ -42,7 +42,7 @@ pub(crate) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Search
         joint: words.joints[of.joint].clone(),
         // what is printed is what is declared
         limit: significant(of.level, 3).parse().unwrap_or(of.level),
-        unit: machine.file.torque_unit(of.joint).to_owned(),
+        unit: setup.file.torque_unit(of.joint).to_owned(),
         share: of.beyond,
         errors: of.errors,
     };
@@ -54,12 +54,12 @@ pub(crate) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Search
 }
 
 /// Unit of a torque times a speed: where the torque is a current it is no power.
-fn power_unit(machine: &LoggedRobot, joint: usize) -> String {
-    match machine.file.torque_unit(joint) {
+fn power_unit(setup: &RobotSetup, joint: usize) -> String {
+    match setup.file.torque_unit(joint) {
         "N" | "Nm" => "W".to_owned(),
         other => format!(
             "{other} {}/s",
-            machine.robot.joint_kind(joint).position_unit()
+            setup.robot.joint_kind(joint).position_unit()
         ),
     }
 }

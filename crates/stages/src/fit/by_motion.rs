@@ -12,10 +12,10 @@ use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_each;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::{in_file, refined};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{FitNote, StageNote};
 use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
 use cft_ident_core::effect::{AugmentedModel, ModelEffect};
@@ -31,7 +31,7 @@ const MIN_WINDOWS_PER_NUMBER: f64 = 4.0;
 
 /// Refines what `lsq` found by the motion that the torques make; without a window, blocks set aside choose it.
 pub(crate) fn by_motion(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     found: &mut IdentifiedDynamics,
     logs: &[LogData],
     window: Option<f64>,
@@ -45,14 +45,14 @@ pub(crate) fn by_motion(
         }
         .into());
     }
-    let file = found.model(machine, None);
-    let start = refined(&file, &machine.name)?;
-    let one_axis = machine.robot.joints() == 1;
+    let file = found.model(setup, None);
+    let start = refined(&file, &setup.name)?;
+    let one_axis = setup.robot.joints() == 1;
     let linear = |law: &JointFriction| matches!(law, JointFriction::ViscousCoulomb(_));
     if !one_axis || !start.model.friction.iter().all(linear) {
         return Err(IdentifyError::NotByMotion);
     }
-    let filtered = &machine.with_position_cutoffs(logs, &known(&start.model), control)?;
+    let filtered = &setup.with_position_cutoffs(logs, &known(&start.model), control)?;
     let settings = filtered.settings();
     let settings = FilterSettings {
         // where the position filter has no neighbours speeds are wrong, and a window that begins there with them
@@ -62,7 +62,7 @@ pub(crate) fn by_motion(
     };
     let whole = read_each(filtered, &vec![settings; logs.len()], logs, control)?;
     let work = control.begin("fit to the motion", None);
-    let offset = machine.file.friction.offset;
+    let offset = setup.file.friction.offset;
     let fit = fit_axis(&start, &whole.stretches, (window, offset), &|| {
         control.stopped()
     });
@@ -73,16 +73,16 @@ pub(crate) fn by_motion(
     drop(work);
     // what least squares does better on blocks set aside, though it has seen them, is not taken from it
     let taken = fit.after.blocks < fit.before.blocks;
-    found.by_motion = Some(motion_fit(machine, &fit, (window.is_some(), taken)));
+    found.by_motion = Some(motion_fit(setup, &fit, (window.is_some(), taken)));
     if !taken {
         found.notes.push(StageNote::Fit(FitNote::MotionNoBetter));
         return Ok(());
     }
     take(found, &fit);
-    let file = found.model(machine, None);
-    let model = refined(&file, &machine.name)?;
-    let data = Dataset::new(machine, logs);
-    let given = GivenModel::new(&machine.name, file);
+    let file = found.model(setup, None);
+    let model = refined(&file, &setup.name)?;
+    let data = Dataset::new(setup, logs);
+    let given = GivenModel::new(&setup.name, file);
     let errors = validate(
         &data,
         &ValidateSettings::of(&given),
@@ -94,8 +94,8 @@ pub(crate) fn by_motion(
         found.fit.residual_std[j] *= error.rmse / joint.rmse;
         *joint = JointResidual::of(error);
     }
-    let file = found.model(machine, None);
-    let smoothed = machine.smoothed_as(&found.position_cutoffs);
+    let file = found.model(setup, None);
+    let smoothed = setup.smoothed_as(&found.position_cutoffs);
     let held = hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control);
     found.held = or_note(held, &mut found.notes)?;
     Ok(())
@@ -139,10 +139,10 @@ fn take(found: &mut IdentifiedDynamics, fit: &AxisFit) {
 }
 
 /// A fit to the motion as documents hold it: whether its windows were given, and whether it is in the model.
-fn motion_fit(machine: &LoggedRobot, fit: &AxisFit, (given, taken): (bool, bool)) -> MotionFit {
+fn motion_fit(setup: &RobotSetup, fit: &AxisFit, (given, taken): (bool, bool)) -> MotionFit {
     MotionFit {
-        joint: machine.robot.joint_names()[0].clone(),
-        unit: machine.robot.joint_kind(0).position_unit(),
+        joint: setup.robot.joint_names()[0].clone(),
+        unit: setup.robot.joint_kind(0).position_unit(),
         window_s: fit.window_s,
         window_given: given,
         windows: fit.windows as u64,
@@ -154,7 +154,7 @@ fn motion_fit(machine: &LoggedRobot, fit: &AxisFit, (given, taken): (bool, bool)
         status: fit.ending,
         steps: fit.steps as u64,
         effects: match taken {
-            true => effects(machine, &fit.model, fit),
+            true => effects(setup, &fit.model, fit),
             false => Vec::new(),
         },
         tried: fit.tried.clone(),
@@ -162,7 +162,7 @@ fn motion_fit(machine: &LoggedRobot, fit: &AxisFit, (given, taken): (bool, bool)
 }
 
 /// Effects as a model file holds them; what the fit left where it was is held.
-fn effects(machine: &LoggedRobot, model: &AugmentedModel, fit: &AxisFit) -> Vec<EffectSection> {
+fn effects(setup: &RobotSetup, model: &AugmentedModel, fit: &AxisFit) -> Vec<EffectSection> {
     let mut first = fit.covariance.nrows()
         - model
             .effects
@@ -179,11 +179,11 @@ fn effects(machine: &LoggedRobot, model: &AugmentedModel, fit: &AxisFit) -> Vec<
         }
         first += n;
         let shown = effect.numbers(
-            &machine.robot,
-            machine.file.torque_unit(0),
+            &setup.robot,
+            setup.file.torque_unit(0),
             Some(covariance.as_slice()),
         );
-        in_file(&effect, machine, &shown)
+        in_file(&effect, setup, &shown)
     };
     model.effects.iter().map(of).collect()
 }

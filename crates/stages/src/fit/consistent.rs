@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::estimate::InertialEstimate;
 use crate::input::error::IdentifyError;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{FitNote, StageNote};
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::inertia::feasible::{
@@ -166,12 +166,12 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
 
 /// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached.
 pub(crate) fn consistent(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     estimated: &InertialEstimate,
     fastest: &[f64],
 ) -> Result<ConsistentLinks, IdentifyError> {
-    let map = machine.robot.standard_map();
-    let bodies = bodies(&machine.file, &map);
+    let map = setup.robot.standard_map();
+    let bodies = bodies(&setup.file, &map);
     let (basis, fit) = (&estimated.basis, &estimated.fit);
     let free = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
     let weights = weights_of(&basis.sums, &free);
@@ -197,8 +197,8 @@ pub(crate) fn consistent(
     let growth = |(free, bound): (&f64, &f64)| if *free > 0.0 { bound / free } else { 1.0 };
     let growth: Vec<f64> = free.iter().zip(&bound).map(growth).collect();
     let squares: f64 = growth.iter().map(|g| g * g * fit.effective_rows).sum();
-    let (links, drives) = links_and_drives(&machine.robot, &map, &found);
-    let names = machine.robot.joint_names().iter();
+    let (links, drives) = links_and_drives(&setup.robot, &map, &found);
+    let names = setup.robot.joint_names().iter();
     let residual = |(joint, of): (&String, &TrialLeftOut)| LeftOutResidual {
         joint: joint.clone(),
         consistent: of.consistent,

@@ -3,8 +3,8 @@
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log_data::{LogData, bridges};
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::{LogPasses, PositionFilter};
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::{FittedUnknown, columns};
 use crate::note::{FitNote, NumberWithStd, StageNote};
 use cft_ident_core::inertia::accumulate::BlockFactors;
@@ -21,17 +21,17 @@ const ROOM_S: f64 = 0.1;
 
 /// Stretches of these logs in which something pushes the robot, one note each.
 pub(crate) fn contacts(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     logs: &[LogData],
     control: &Control,
 ) -> Result<Vec<StageNote>, IdentifyError> {
-    let linear = machine.file.friction_law() != FrictionLawKind::DoubleTanh;
-    if !linear || machine.robot.joints() < 2 || logs.iter().any(|log| log.reduced().is_some()) {
+    let linear = setup.file.friction_law() != FrictionLawKind::DoubleTanh;
+    if !linear || setup.robot.joints() < 2 || logs.iter().any(|log| log.reduced().is_some()) {
         return Ok(Vec::new());
     }
-    let own = machine.own_settings(logs, &[], control)?;
-    let mut passes = LogPasses::new(machine, logs, control).each_by_itself(own);
-    passes.read(PositionFilter::Declared, &columns(machine, None), None)?;
+    let own = setup.own_settings(logs, &[], control)?;
+    let mut passes = LogPasses::new(setup, logs, control).each_by_itself(own);
+    passes.read(PositionFilter::Declared, &columns(setup, None), None)?;
     passes.contacts()
 }
 
@@ -41,16 +41,16 @@ impl LogPasses<'_> {
         let noted = |(log, jump): &(usize, ResidualJump)| {
             let log = &self.logs[*log];
             let first = log.first_row()?;
-            Ok(StageNote::Fit(contact(self.machine, log, jump, first)))
+            Ok(StageNote::Fit(contact(self.setup, log, jump, first)))
         };
         self.jumps.iter().map(noted).collect()
     }
 }
 
 /// `first` is the time of the first row that is read, as the rows have it [s].
-fn contact(machine: &LoggedRobot, log: &LogData, jump: &ResidualJump, first: f64) -> FitNote {
+fn contact(setup: &RobotSetup, log: &LogData, jump: &ResidualJump, first: f64) -> FitNote {
     let [from, to] = jump.span.map(|t| t - first);
-    let names = machine.robot.joint_names();
+    let names = setup.robot.joint_names();
     let joints = jump.joints.iter();
     FitNote::Contact {
         log: escape(&log.name()),
@@ -63,7 +63,7 @@ fn contact(machine: &LoggedRobot, log: &LogData, jump: &ResidualJump, first: f64
 
 /// What a fit says with the rows that were bridged as they were logged, where that is another thing.
 pub(crate) fn hangs_on_bridged(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     logs: &[LogData],
     (linear, rows): (&RegressorColumns, &BlockFactors),
     unknowns: &[FittedUnknown],
@@ -72,7 +72,7 @@ pub(crate) fn hangs_on_bridged(
     if !bridges(logs)? {
         return Ok(None);
     }
-    let kept = machine.keeping(RowFault::Spike);
+    let kept = setup.keeping(RowFault::Spike);
     let logs = logs.iter().map(|log| log.read_again(&kept, control));
     let logs = &logs.collect::<Result<Vec<_>, _>>()?;
     let own = kept.own_settings(logs, &[], control)?;

@@ -12,9 +12,9 @@ use super::motion_fit::MotionFit;
 use super::weakest::WeakestPart;
 use crate::held_out::hold_out::Held;
 use crate::held_out::residual::{JointResidual, RelativeError};
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::new_model;
 use crate::input::position_cutoff::PositionCutoff;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
 use crate::note::StageNote;
 use crate::setup::Finding;
@@ -99,17 +99,17 @@ pub struct EssentialFit {
 
 impl IdentifiedDynamics {
     /// The model: friction as it was known, and what was fitted, with their joint covariance.
-    pub fn model(&self, machine: &LoggedRobot, friction: Option<&ModelFile>) -> ModelFile {
+    pub fn model(&self, setup: &RobotSetup, friction: Option<&ModelFile>) -> ModelFile {
         let command = if self.gains.is_empty() {
             "lsq"
         } else {
             LSQ_WITH_GAINS
         };
-        let mut model = new_model(machine, command, &self.inputs);
+        let mut model = new_model(setup, command, &self.inputs);
         let estimator = self.account.estimator;
         model.provenance.estimator = (estimator != EstimatorKind::Wls).then_some(estimator);
         model.parameters = self.unknowns.iter().map(FittedUnknown::parameter).collect();
-        let robot = &machine.robot;
+        let robot = &setup.robot;
         let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
         if let Some(friction) = friction {
             let known = &self.columns.known;

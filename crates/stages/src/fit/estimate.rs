@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::known_friction::{of_joint, of_refinement, with_friction};
 use crate::input::error::IdentifyError;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::{LogPasses, PositionFilter, SimulatedLoop};
+use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
 use cft_ident_core::inertia::add_processing;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
@@ -78,8 +78,8 @@ impl EstimatorAccount {
     }
 
     /// Says something of every joint.
-    fn record(&mut self, machine: &LoggedRobot, of: impl Fn(usize) -> JointAccount) {
-        let names = machine.robot.joint_names().iter().enumerate();
+    fn record(&mut self, setup: &RobotSetup, of: impl Fn(usize) -> JointAccount) {
+        let names = setup.robot.joint_names().iter().enumerate();
         self.joints = names
             .map(|(j, joint)| JointAccount {
                 joint: joint.clone(),
@@ -328,7 +328,7 @@ fn refinement(
     account.law_refined = refined.columns.known.iter().any(Option::is_some);
     account.status = refined.ending;
     account.iterations = refined.iterations;
-    account.record(passes.machine, |j| JointAccount {
+    account.record(passes.setup, |j| JointAccount {
         relative_error_before: Some(refined.before[j].all),
         ..JointAccount::default()
     });
@@ -353,7 +353,7 @@ fn robust_regression(
     } = robust::irls(&mut |weigher| passes.read(PositionFilter::Declared, columns, weigher))?;
     account.status = status;
     account.iterations = iterations;
-    account.record(passes.machine, |j| JointAccount {
+    account.record(passes.setup, |j| JointAccount {
         scale: Some(scale[j]),
         down_weighted: Some(down_weighted[j]),
         ..JointAccount::default()
@@ -371,7 +371,7 @@ fn instrumental(
     passes.work.doing("instrumental variables");
     let sums = passes.read(PositionFilter::Declared, columns, None)?;
     let plain = fit(&sums, solve::RowWeighting::Wls)?;
-    let map = passes.machine.robot.standard_map();
+    let map = passes.setup.robot.standard_map();
     let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
     let effective = plain.effective_rows / plain.rows as f64;
     let mut simulate_by = plain.theta.clone();
@@ -387,7 +387,7 @@ fn instrumental(
         Ok::<_, IdentifyError>(sums)
     })?;
     if let Some(SimulatedLoop { gains, .. }) = account.simulated.clone() {
-        account.record(passes.machine, |j| JointAccount {
+        account.record(passes.setup, |j| JointAccount {
             proportional: gains.proportional.get(j).copied(),
             derivative: gains.derivative.get(j).copied(),
             ..JointAccount::default()
@@ -429,7 +429,7 @@ fn widen(
         }
     };
     add_processing(fit, &again);
-    let grids = passes.machine.robot.transmission().encoder_steps();
+    let grids = passes.setup.robot.transmission().encoder_steps();
     let wls = matches!(solver, Solver::Linear(solve::RowWeighting::Wls));
     if grids.is_none() && !wls {
         return Ok(None);

@@ -10,10 +10,10 @@ use crate::input::control::Control;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::new_model;
 use crate::input::one_joint::{self, OneJointLog};
 use crate::input::repeated::each_row_once;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{FrictionNote, StageNote};
 use crate::setup::Finding;
 use cft_ident_core::friction::estimate::{FrictionOptions, JointEstimate, estimate};
@@ -105,7 +105,7 @@ impl LawParameters {
 
 impl FrictionOfJoint {
     fn of(
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         index: usize,
         logs: Vec<Provenance>,
         estimate: JointEstimate,
@@ -113,17 +113,17 @@ impl FrictionOfJoint {
         let parameter = |k: usize| {
             let v = &estimate.values[k];
             let known = v.verdict != Verdict::NotIdentifiable;
-            let (name, torque) = (DoubleTanh::NAMES[k], machine.file.torque_unit(index));
+            let (name, torque) = (DoubleTanh::NAMES[k], setup.file.torque_unit(index));
             LawParameter {
                 value: known.then_some(v.value),
                 std: known.then_some(v.std),
-                unit: friction_unit(&machine.robot, index, name, torque),
-                theta: machine.robot.friction_theta(index, k),
+                unit: friction_unit(&setup.robot, index, name, torque),
+                theta: setup.robot.friction_theta(index, k),
                 verdict: v.verdict,
             }
         };
         FrictionOfJoint {
-            joint: machine.robot.joint_names()[index].clone(),
+            joint: setup.robot.joint_names()[index].clone(),
             index,
             logs,
             converged: estimate.ending == IterationEnding::Converged,
@@ -148,22 +148,22 @@ pub fn friction(
     settings: &FrictionSettings,
     control: &Control,
 ) -> Result<IdentifiedFriction, IdentifyError> {
-    let (machine, logs) = (&data.machine, data.logs.as_slice());
-    machine.check_gains()?;
-    each_row_once(machine, &[("fit", logs)])?;
-    let (groups, inputs, of_logs) = by_joint(machine, logs, settings, control)?;
-    let mut notes: Vec<StageNote> = StageNote::of_robot(&machine.file).chain(of_logs).collect();
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
+    setup.check_gains()?;
+    each_row_once(setup, &[("fit", logs)])?;
+    let (groups, inputs, of_logs) = by_joint(setup, logs, settings, control)?;
+    let mut notes: Vec<StageNote> = StageNote::of_robot(&setup.file).chain(of_logs).collect();
     let work = control.begin("friction filter", Some(groups.len() as u64));
-    let parameters = machine.robot.parameters().iter();
+    let parameters = setup.robot.parameters().iter();
     let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();
     // joints do not know of one another: they run in parallel, and are collected in joint order
     let found: Vec<Result<FrictionOfJoint, IdentifyError>> = groups
         .into_par_iter()
         .map(|(j, group)| {
             control.check()?;
-            let estimate = one_joint(machine, j, &group, &parameter_names)?;
+            let estimate = one_joint(setup, j, &group, &parameter_names)?;
             work.advance(1);
-            Ok(FrictionOfJoint::of(machine, j, group.inputs, estimate))
+            Ok(FrictionOfJoint::of(setup, j, group.inputs, estimate))
         })
         .collect();
     let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -181,12 +181,12 @@ pub fn friction(
 type LogsByJoint = (BTreeMap<usize, JointLogs>, Vec<Provenance>, Vec<StageNote>);
 
 fn by_joint(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     logs: &[LogData],
     settings: &FrictionSettings,
     control: &Control,
 ) -> Result<LogsByJoint, IdentifyError> {
-    let names = machine.robot.joint_names();
+    let names = setup.robot.joint_names();
     let place = |name: &String| {
         let found = names.iter().position(|n| n == name);
         found.ok_or_else(|| IdentifyError::NoJoint {
@@ -196,7 +196,7 @@ fn by_joint(
     };
     let named = settings.joint.as_ref().map(place).transpose()?;
     let _work = control.begin("reading logs", None);
-    let ranges = machine.ranges();
+    let ranges = setup.ranges();
     let mut groups: BTreeMap<usize, JointLogs> = BTreeMap::new();
     let (mut inputs, mut notes) = (Vec::new(), Vec::new());
     for log in logs {
@@ -206,7 +206,7 @@ fn by_joint(
             zero_order_hold,
             provenance,
             notes: of_log,
-        } = one_joint::read(machine, log, control)?;
+        } = one_joint::read(setup, log, control)?;
         inputs.push(provenance.clone());
         notes.extend(of_log);
         let moving = match named {
@@ -239,24 +239,24 @@ struct JointLogs {
 }
 
 fn one_joint(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     j: usize,
     group: &JointLogs,
     parameter_names: &[String],
 ) -> Result<JointEstimate, IdentifyError> {
-    let name = &machine.robot.joint_names()[j];
+    let name = &setup.robot.joint_names()[j];
     let place = group.logs.join(", ");
     let undetermined = |error: FrictionError| IdentifyError::Friction {
         logs: place.clone(),
         error,
     };
-    let noise = machine.file.noise.joint.get(name);
+    let noise = setup.file.noise.joint.get(name);
     let given = noise.and_then(|n| n.position_resolution);
-    let resolution = given.unwrap_or_else(|| resolution(&group.motions, machine.robot.joints(), j));
+    let resolution = given.unwrap_or_else(|| resolution(&group.motions, setup.robot.joints(), j));
     let variance = |q: &[f64]| -> f64 {
         let known = match given {
             Some(_) => None,
-            None => machine.robot.transmission().encoder_variance(j, q),
+            None => setup.robot.transmission().encoder_variance(j, q),
         };
         known.unwrap_or(resolution * resolution / 12.0)
     };
@@ -264,13 +264,13 @@ fn one_joint(
         variance: &variance,
         zero_order_hold: group.zero_order_hold,
     };
-    let prepared = prepare(&machine.robot, j, &group.motions, &sensors).ok_or_else(|| {
+    let prepared = prepare(&setup.robot, j, &group.motions, &sensors).ok_or_else(|| {
         undetermined(FrictionError::StandsStill {
             joint: name.clone(),
         })
     })?;
     let options = FrictionOptions {
-        start: start_of(machine, name),
+        start: start_of(setup, name),
         noise: GivenNoise {
             torque: noise.and_then(|n| n.torque_std),
             position_factor: None,
@@ -278,7 +278,7 @@ fn one_joint(
         ..FrictionOptions::default()
     };
     let inputs = FrictionInputs {
-        robot: &machine.robot,
+        robot: &setup.robot,
         joint: j,
         motions: &group.motions,
         narrower: &group.narrower,
@@ -288,8 +288,8 @@ fn one_joint(
 }
 
 /// The user's starting values, where all five are given.
-fn start_of(machine: &LoggedRobot, joint: &str) -> Option<DoubleTanh> {
-    let s = machine.file.friction.joint.get(joint)?;
+fn start_of(setup: &RobotSetup, joint: &str) -> Option<DoubleTanh> {
+    let s = setup.file.friction.joint.get(joint)?;
     Some(DoubleTanh {
         viscous: s.viscous?,
         coulomb_1: s.coulomb_1?,
@@ -382,8 +382,8 @@ fn file_parameters(found: &FrictionOfJoint) -> Vec<Parameter> {
 
 impl IdentifiedFriction {
     /// The model of these joints, with all that `old` has of the others and their inertias, where there is one.
-    pub fn model(&self, machine: &LoggedRobot, old: Option<&ModelFile>) -> ModelFile {
-        let mut model = new_model(machine, "friction", &self.inputs);
+    pub fn model(&self, setup: &RobotSetup, old: Option<&ModelFile>) -> ModelFile {
+        let mut model = new_model(setup, "friction", &self.inputs);
         if let Some(old) = old {
             model.parameters.clone_from(&old.parameters);
             model.covariance.clone_from(&old.covariance);

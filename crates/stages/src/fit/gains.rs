@@ -10,8 +10,8 @@ use crate::input::error::IdentifyError;
 use crate::input::gain_error::GainError;
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::{LogPasses, PositionFilter};
+use crate::input::robot_setup::RobotSetup;
 use crate::input::setup_file::differences;
 use crate::input::unknowns::columns;
 use crate::note::{FitNote, StageNote};
@@ -69,7 +69,7 @@ pub struct CurrentGains {
 pub struct FittedGains {
     pub gains: CurrentGains,
     /// The robot, its file with the gains as `torque_scale`.
-    pub machine: LoggedRobot,
+    pub setup: RobotSetup,
     /// What differs in its file.
     pub edits: Vec<KeyEdit>,
     /// Factors by which the channels were multiplied.
@@ -87,10 +87,10 @@ impl FittedGains {
                 .iter()
                 .map(|log| log.source().with_torques_times(&self.factors));
             let logs = logs.collect::<Result<Vec<Log>, _>>()?;
-            LogData::read_all(&self.machine, &logs, &[], control)
+            LogData::read_all(&self.setup, &logs, &[], control)
         };
         Ok(Dataset {
-            machine: self.machine.clone(),
+            setup: self.setup.clone(),
             logs: scaled(&data.logs)?,
             one_joint: scaled(&data.one_joint)?,
             held_out: scaled(&data.held_out)?,
@@ -108,46 +108,44 @@ pub fn fit_gains(
     payload: Option<&PayloadLog>,
     control: &Control,
 ) -> Result<FittedGains, IdentifyError> {
-    let (machine, logs) = (&data.machine, data.logs.as_slice());
-    usable(machine, payload)?;
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
+    usable(setup, payload)?;
     let shape = payload
-        .map(|_| PayloadColumns::of(&machine.robot))
+        .map(|_| PayloadColumns::of(&setup.robot))
         .transpose()?;
     if shape.as_ref().is_some_and(|shape| !shape.shows_mass()) {
         return Err(GainError::MassHidden.into());
     }
     let loaded: Vec<Log> = payload.iter().map(|p| p.log.clone()).collect();
-    let loaded = LogData::read_all(machine, &loaded, &[logs], control)?;
-    let mut columns = columns(machine, None);
-    columns.rest_at(machine.rest_speeds(&[logs, &loaded].concat())?);
+    let loaded = LogData::read_all(setup, &loaded, &[logs], control)?;
+    let mut columns = columns(setup, None);
+    columns.rest_at(setup.rest_speeds(&[logs, &loaded].concat())?);
     let mut reading = LoadReadings {
-        unloaded: LogPasses::new(machine, logs, control),
-        loaded: LogPasses::new(machine, &loaded, control),
+        unloaded: LogPasses::new(setup, logs, control),
+        loaded: LogPasses::new(setup, &loaded, control),
         columns,
         payload: shape,
     };
     let fit = reading.fit(PositionFilter::Declared)?;
     let narrow = reading.fit(PositionFilter::Narrower)?;
     let relative = covariance(&fit, &narrow, payload);
-    judged(machine, &fit, &relative, payload)?;
-    let n = machine.robot.joints();
-    let factors: Vec<f64> = (0..n).map(|j| factor(machine, &fit, payload, j)).collect();
-    let scaled = with_gains(machine, &factors, payload.is_none());
-    let joints = machine.robot.joint_names().iter().enumerate();
+    judged(setup, &fit, &relative, payload)?;
+    let n = setup.robot.joints();
+    let factors: Vec<f64> = (0..n).map(|j| factor(setup, &fit, payload, j)).collect();
+    let scaled = with_gains(setup, &factors, payload.is_none());
+    let joints = setup.robot.joint_names().iter().enumerate();
     let gain = |(j, joint): (usize, &String)| {
-        let value = factors[j] * declared(machine, j);
+        let value = factors[j] * declared(setup, j);
         let std = value.abs() * relative[(j, j)].sqrt();
         Gain {
             joint: joint.clone(),
             value,
             std,
-            unit: unit(machine, j, payload.is_none()),
+            unit: unit(setup, j, payload.is_none()),
             verdict: verdict_of(value, std),
         }
     };
-    let reference = fit
-        .reference
-        .map(|j| machine.robot.joint_names()[j].clone());
+    let reference = fit.reference.map(|j| setup.robot.joint_names()[j].clone());
     Ok(FittedGains {
         gains: CurrentGains {
             joints: joints.map(gain).collect(),
@@ -160,8 +158,8 @@ pub fn fit_gains(
             covariance: relative,
             inputs: std::mem::take(&mut reading.loaded.inputs),
         },
-        edits: edits(&scaled.file, &machine.file),
-        machine: scaled,
+        edits: edits(&scaled.file, &setup.file),
+        setup: scaled,
         factors,
     })
 }
@@ -191,19 +189,19 @@ impl LoadReadings<'_> {
 }
 
 /// Whether gains can be fitted for this robot and payload at all.
-fn usable(machine: &LoggedRobot, payload: Option<&PayloadLog>) -> Result<(), GainError> {
+fn usable(setup: &RobotSetup, payload: Option<&PayloadLog>) -> Result<(), GainError> {
     let not_by_joint = |why| {
         Err(GainError::NotByJoint {
-            robot: cft_ident_logs::log::escape(&machine.name),
+            robot: cft_ident_logs::log::escape(&setup.name),
             why,
         })
     };
-    if machine.robot.transmission().coordinates().is_some() {
+    if setup.robot.transmission().coordinates().is_some() {
         return not_by_joint(
             "the motors of this robot move no single joint, and their gains are known",
         );
     }
-    if !machine.file.log.gears.is_empty() {
+    if !setup.file.log.gears.is_empty() {
         return not_by_joint("`gears` makes each joint's torque of several motors");
     }
     match payload {
@@ -239,11 +237,11 @@ fn covariance(fit: &GainFit, narrow: &GainFit, payload: Option<&PayloadLog>) -> 
 }
 
 /// Factor that the channel of joint j lacks: to a torque, or to the unit of the reference's channel.
-fn factor(machine: &LoggedRobot, fit: &GainFit, payload: Option<&PayloadLog>, j: usize) -> f64 {
+fn factor(setup: &RobotSetup, fit: &GainFit, payload: Option<&PayloadLog>, j: usize) -> f64 {
     match (payload, fit.reference) {
         (Some(payload), _) => payload.mass / fit.channel[j],
         (None, Some(reference)) => {
-            fit.channel[reference] / fit.channel[j] / declared(machine, reference)
+            fit.channel[reference] / fit.channel[j] / declared(setup, reference)
         }
         (None, None) => 1.0,
     }
@@ -254,12 +252,12 @@ const MAX_RELATIVE_STD: f64 = 0.5;
 
 /// Whether the logs fix the gains, with the sign that is declared.
 fn judged(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     fit: &GainFit,
     relative: &DMatrix<f64>,
     payload: Option<&PayloadLog>,
 ) -> Result<(), GainError> {
-    let names = machine.robot.joint_names();
+    let names = setup.robot.joint_names();
     let n = names.len();
     let spread = |j: usize| relative[(j, j)].sqrt();
     let open: Vec<usize> = (0..n)
@@ -282,7 +280,7 @@ fn judged(
     };
     let Some(payload) = payload else {
         let reference = fit.reference.unwrap_or(0);
-        let ratio = |j: usize| factor(machine, fit, None, j) * declared(machine, j);
+        let ratio = |j: usize| factor(setup, fit, None, j) * declared(setup, j);
         if !open.is_empty() || n < 2 {
             let joints = if open.is_empty() { vec![0] } else { open };
             return Err(GainError::RatioUndetermined {
@@ -308,7 +306,7 @@ fn judged(
             joints: shown(&all, &|j| fit.channel[j]),
         });
     }
-    let gain = |j: usize| factor(machine, fit, Some(payload), j) * declared(machine, j);
+    let gain = |j: usize| factor(setup, fit, Some(payload), j) * declared(setup, j);
     if !open.is_empty() {
         return Err(GainError::Undetermined {
             found: in_brackets(shown(&open, &gain)),
@@ -329,20 +327,20 @@ fn judged(
 }
 
 /// Torque per unit of the channel that the robot file gives already; 1 where it gives none.
-fn declared(machine: &LoggedRobot, j: usize) -> f64 {
-    let name = &machine.robot.joint_names()[j];
-    let channels = machine.file.log.joint.get(name);
+fn declared(setup: &RobotSetup, j: usize) -> f64 {
+    let name = &setup.robot.joint_names()[j];
+    let channels = setup.file.log.joint.get(name);
     channels.and_then(|c| c.torque_scale).unwrap_or(1.0)
 }
 
 /// Unit of a gain.
-fn unit(machine: &LoggedRobot, j: usize, ratio: bool) -> String {
+fn unit(setup: &RobotSetup, j: usize, ratio: bool) -> String {
     if ratio {
         return "1".to_owned();
     }
-    let torque = machine.robot.joint_unit(j);
-    let name = &machine.robot.joint_names()[j];
-    let channels = machine.file.log.joint.get(name);
+    let torque = setup.robot.joint_unit(j);
+    let name = &setup.robot.joint_names()[j];
+    let channels = setup.file.log.joint.get(name);
     match channels
         .and_then(|c| c.torque_unit)
         .map(TorqueUnit::kept_label)
@@ -353,16 +351,16 @@ fn unit(machine: &LoggedRobot, j: usize, ratio: bool) -> String {
 }
 
 /// The robot with the gains in its file.
-fn with_gains(machine: &LoggedRobot, factors: &[f64], relative: bool) -> LoggedRobot {
-    let mut file = machine.file.clone();
-    for (j, name) in machine.robot.joint_names().iter().enumerate() {
+fn with_gains(setup: &RobotSetup, factors: &[f64], relative: bool) -> RobotSetup {
+    let mut file = setup.file.clone();
+    for (j, name) in setup.robot.joint_names().iter().enumerate() {
         let channels = file.log.joint.entry(name.clone()).or_default();
         channels.torque_scale = Some(factors[j] * channels.torque_scale.unwrap_or(1.0));
         // it is added in the unit that the scale leads to
         channels.torque_offset = channels.torque_offset.map(|offset| offset * factors[j]);
     }
     file.log.relative_gains = relative;
-    machine.with_file(file)
+    setup.with_file(file)
 }
 
 /// The lines of a robot file that its gains are.
@@ -379,11 +377,11 @@ fn edits(new: &RobotFile, old: &RobotFile) -> Vec<KeyEdit> {
 }
 
 /// Channels that are no torques and have no gains, as entries of the key `setup`.
-pub(crate) fn findings(machine: &LoggedRobot) -> Vec<Finding> {
-    let found = machine.file.without_gains();
+pub(crate) fn findings(setup: &RobotSetup) -> Vec<Finding> {
+    let found = setup.file.without_gains();
     let finding = |(j, unit): &(usize, &str)| {
-        let joint = &machine.robot.joint_names()[*j];
-        let torque = machine.robot.joint_unit(*j);
+        let joint = &setup.robot.joint_names()[*j];
+        let torque = setup.robot.joint_unit(*j);
         Finding {
             channel: Some(ChannelKind::Torque),
             ..Finding::new(

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
 use crate::setup::{Finding, FindingKind, Setting};
 use cft_ident_core::verdict::Verdict;
@@ -87,18 +87,18 @@ fn parameters<'n>(file: &RobotFile, plain: impl Iterator<Item = &'n NearRoundNum
 
 /// What of the geometry makes a parameter that the rows do not show, where the condition number is that of such a one.
 pub(crate) fn geometry(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     condition: Option<f64>,
     unknowns: &[FittedUnknown],
 ) -> Vec<Finding> {
-    let file = &machine.file;
+    let file = &setup.file;
     let open = |u: &&FittedUnknown| u.joint.is_none() && u.verdict == Verdict::NotIdentifiable;
     let poor = condition.is_none_or(|condition| condition > MAX_CONDITION);
     if file.robot.model != ModelKind::Serial || !poor || !unknowns.iter().any(|u| open(&u)) {
         return Vec::new();
     }
     let nearly = all_nearly(&file.robot.link);
-    let declared = machine.robot.parameters().len();
+    let declared = setup.robot.parameters().len();
     let plain = parameters(file, nearly.iter());
     if nearly.is_empty() || plain >= declared {
         return Vec::new();

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{FrictionNote, StageNote};
 use cft_ident_core::friction::estimate::curve_std;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
@@ -71,7 +71,7 @@ impl FrictionBefore {
     /// # Errors
     /// A model without a joint's friction, and logs that cannot be read.
     pub fn of(
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         (name, file): (&str, &ModelFile),
         logs: &[LogData],
         (estimator, hold): (EstimatorKind, bool),
@@ -88,7 +88,7 @@ impl FrictionBefore {
             priors: Vec::new(),
             left_out: Vec::new(),
         };
-        for joint in machine.robot.joint_names() {
+        for joint in setup.robot.joint_names() {
             let prior = prior_of((name, file), joint, &given)?;
             let law = file.double_tanh(name, joint)?;
             let (values, mut covariance) = (
@@ -130,12 +130,12 @@ impl FrictionBefore {
     /// The friction of every joint as a fit leaves it in `columns`; `all` is the covariance of unknowns and friction.
     pub fn after(
         &self,
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         columns: &RegressorColumns,
         all: &DMatrix<f64>,
     ) -> Vec<FrictionOfFit> {
         let first = all.nrows() - GRADIENT * self.known.len();
-        let joints = machine.robot.joint_names().iter().enumerate();
+        let joints = setup.robot.joint_names().iter().enumerate();
         let of = |(j, joint): (usize, &String)| {
             let before = &self.known[j];
             let now = columns.known[j].as_ref().unwrap_or(before).law.parameters();
@@ -146,10 +146,10 @@ impl FrictionBefore {
                 let std = variance(all[(at, at)]);
                 let held = before.held[k];
                 let unit = friction_unit(
-                    &machine.robot,
+                    &setup.robot,
                     j,
                     DoubleTanh::NAMES[k],
-                    machine.file.torque_unit(j),
+                    setup.file.torque_unit(j),
                 );
                 FrictionParameter {
                     value: now[k],
@@ -174,14 +174,14 @@ impl FrictionBefore {
     /// greatest speed of each joint.
     pub fn beyond(
         &self,
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         columns: &RegressorColumns,
         all: &DMatrix<f64>,
         fastest: &[f64],
     ) -> Vec<StageNote> {
         let first = all.nrows() - GRADIENT * self.known.len();
         let mut out = Vec::new();
-        for (j, joint) in machine.robot.joint_names().iter().enumerate() {
+        for (j, joint) in setup.robot.joint_names().iter().enumerate() {
             let (Some(covered), speed) = (self.priors[j].speeds_covered, fastest[j]) else {
                 continue;
             };
@@ -193,7 +193,7 @@ impl FrictionBefore {
                 .map_or(self.known[j].law, |k| k.law);
             let covariance = of_joint(all, first + GRADIENT * j);
             let (torque, std) = (law.torque(speed), curve_std(&law, &covariance, speed));
-            let position = machine.robot.joint_kind(j).position_unit();
+            let position = setup.robot.joint_kind(j).position_unit();
             out.push(StageNote::Friction {
                 joint: joint.clone(),
                 note: FrictionNote::FasterThanLogged {

@@ -66,15 +66,15 @@ pub fn lsq(
     settings: &LsqSettings,
     control: &Control,
 ) -> Result<IdentifiedDynamics, IdentifyError> {
-    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
     let estimator = settings.estimator;
     let friction = (settings.friction).map(|given| (given.name.as_str(), &given.file));
-    machine.check_gains()?;
-    each_row_once(machine, &[("fit", logs)])?;
+    setup.check_gains()?;
+    each_row_once(setup, &[("fit", logs)])?;
     if settings.gains.is_some() && friction.is_some() {
         return Err(GainError::FrictionGiven.into());
     }
-    let law = friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh;
+    let law = friction.is_none() && setup.file.friction_law() == FrictionLawKind::DoubleTanh;
     if law && !matches!(estimator, EstimatorKind::Wls | EstimatorKind::Oe) {
         return Err(IdentifyError::LawIsNotLinear {
             estimator: estimator.name(),
@@ -93,13 +93,13 @@ pub fn lsq(
     }
     let before = friction.map(|given| {
         let hold = settings.hold_friction || estimator == EstimatorKind::Ols || !reduced.is_empty();
-        FrictionBefore::of(machine, given, logs, (estimator, hold), control)
+        FrictionBefore::of(setup, given, logs, (estimator, hold), control)
     });
     let before = before.transpose()?;
-    let linear = columns(machine, before.as_ref().map(|b| b.known.as_slice()));
+    let linear = columns(setup, before.as_ref().map(|b| b.known.as_slice()));
     let name = friction.map(|(name, _)| name);
     let wanted = MadeWith::of(
-        &machine.file,
+        &setup.file,
         name.zip(before.as_ref().map(|b| b.known.as_slice())),
     );
     for part in &reduced {
@@ -109,9 +109,9 @@ pub fn lsq(
     let laws: Vec<_> = known
         .map(|known| Some(JointFriction::DoubleTanh(known.as_ref()?.law)))
         .collect();
-    let own = machine.own_settings(logs, &laws, control)?;
+    let own = setup.own_settings(logs, &laws, control)?;
     let costs: Vec<CutoffCosts> = own.iter().map(|own| own.costs.clone()).collect();
-    let mut passes = LogPasses::new(machine, logs, control).each_by_itself(own);
+    let mut passes = LogPasses::new(setup, logs, control).each_by_itself(own);
     passes.plain = estimator == EstimatorKind::Ols;
     let mut estimated = estimate(&mut passes, linear.clone(), estimator, law)?;
     if let Some(gains) = settings.gains {
@@ -120,10 +120,10 @@ pub fn lsq(
     let (essential, essential_error) = essentials(&estimated)?;
     let resting = estimated.basis.sums.resting_shares();
     // in amperes nothing says what a body can be
-    let consistent = match settings.consistent && is_in_si(machine) {
+    let consistent = match settings.consistent && is_in_si(setup) {
         true => {
-            let fastest = machine.fastest(logs)?;
-            let found = consistent(machine, &estimated, &fastest);
+            let fastest = setup.fastest(logs)?;
+            let found = consistent(setup, &estimated, &fastest);
             or_plain_fit(found, &mut passes.notes)
         }
         false => None,
@@ -147,7 +147,7 @@ pub fn lsq(
         .view_mut((0, 0), (u, u))
         .copy_from(&fit.covariance);
     let mut notes = passes.contacts()?;
-    notes.extend(StageNote::of_robot(&machine.file));
+    notes.extend(StageNote::of_robot(&setup.file));
     notes.extend(settings.gains.iter().flat_map(|g| g.notes.clone()));
     let of_fit = consistent.iter().flat_map(ConsistentLinks::notes);
     let of_fit = of_fit
@@ -160,32 +160,32 @@ pub fn lsq(
         .chain(held_by_parts(settings, &reduced));
     notes.extend(of_fit.map(StageNote::Fit));
     notes.append(&mut passes.notes);
-    notes.extend(rests(machine, &resting).map(StageNote::Fit));
+    notes.extend(rests(setup, &resting).map(StageNote::Fit));
     let mut friction_of_fit = Vec::new();
     let mut friction_prior = Vec::new();
     if let (Some(before), Some((_, file))) = (&before, friction) {
         friction_prior = before.kept(file, &passes.inputs);
         // `oe` has the friction among its unknowns
         if estimator != EstimatorKind::Oe {
-            friction_of_fit = before.after(machine, &columns, &covariance);
-            let fastest = machine.fastest(logs)?;
-            notes.extend(before.beyond(machine, &columns, &covariance, &fastest));
+            friction_of_fit = before.after(setup, &columns, &covariance);
+            let fastest = setup.fastest(logs)?;
+            notes.extend(before.beyond(setup, &columns, &covariance, &fastest));
         }
     }
     let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
     let mut inputs = std::mem::take(&mut passes.inputs);
     inputs.extend(settings.gains.iter().flat_map(|g| g.inputs.clone()));
-    let unknowns = unknowns(machine, &columns, &fit, &essential);
+    let unknowns = unknowns(setup, &columns, &fit, &essential);
     let plain = matches!(estimator, EstimatorKind::Ols | EstimatorKind::Wls) && !law;
     if plain && before.is_none() && reduced.is_empty() {
         let rows = (&linear, &sums);
-        let hangs = hangs_on_bridged(machine, logs, rows, &unknowns, control)?;
+        let hangs = hangs_on_bridged(setup, logs, rows, &unknowns, control)?;
         notes.extend(hangs.map(StageNote::Fit));
     }
     let doubts = confounded(&fit, &unknowns).into_iter();
     notes.extend(doubts.chain(negative(&unknowns)).map(StageNote::Fit));
     let costs: Vec<&CutoffCosts> = costs.iter().collect();
-    let (position_cutoffs, wrong) = CutoffCosts::described(&costs, machine, &columns, &fit);
+    let (position_cutoffs, wrong) = CutoffCosts::described(&costs, setup, &columns, &fit);
     notes.extend(wrong);
     if unknowns
         .iter()
@@ -203,7 +203,7 @@ pub fn lsq(
     if !unknowns.iter().any(|u| known(&u)) && least > NOISE_ONLY_SHARE {
         return Err(IdentifyError::OnlyNoise { left: least });
     }
-    let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
+    let of_geometry = geometry(setup, fit.condition.normalised, &unknowns);
     let found = of_geometry.iter().cloned().map(Box::new);
     notes.extend(found.map(FitNote::Geometry).map(StageNote::Fit));
     let plain_error: Vec<f64> = fit.relative_error.iter().map(left).collect();
@@ -212,15 +212,15 @@ pub fn lsq(
         by_motion: None,
         essential: EssentialFit {
             count: essential.essential.iter().filter(|e| **e).count(),
-            joints: RelativeError::each(machine, &essential_error),
+            joints: RelativeError::each(setup, &essential_error),
         },
         condition: fit.condition,
         rank: fit.rank,
         weakest_direction: weakest(&fit, &unknowns),
-        samples: fit.rows * machine.robot.joints() as u64,
-        effective_samples: fit.effective_rows * machine.robot.joints() as f64,
+        samples: fit.rows * setup.robot.joints() as u64,
+        effective_samples: fit.effective_rows * setup.robot.joints() as f64,
         unconstrained_residual: match &consistent {
-            Some(of) if of.in_use => RelativeError::each(machine, &plain_error),
+            Some(of) if of.in_use => RelativeError::each(setup, &plain_error),
             _ => Vec::new(),
         },
         joints: Vec::new(),
@@ -240,18 +240,18 @@ pub fn lsq(
         setup: of_geometry,
     };
     // every figure is that of the numbers that are written
-    let file = found.model(machine, friction.map(|(_, file)| file));
-    let errors = errors_on_fitted(machine, &file, logs, control)?;
+    let file = found.model(setup, friction.map(|(_, file)| file));
+    let errors = errors_on_fitted(setup, &file, logs, control)?;
     found.joints = errors.joints.into_iter().map(JointResidual::of).collect();
     // what is set aside is looked at row by row
     if reduced.is_empty() {
-        let smoothed = machine.smoothed_as(&found.position_cutoffs);
-        let tried = refined(&file, &machine.name)
+        let smoothed = setup.smoothed_as(&found.position_cutoffs);
+        let tried = refined(&file, &setup.name)
             .and_then(|model| hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control));
         found.held = or_note(tried, &mut found.notes)?;
     }
     if let Some(window) = settings.open_loop {
-        by_motion(machine, &mut found, logs, window, control)?;
+        by_motion(setup, &mut found, logs, window, control)?;
     }
     Ok(found)
 }

@@ -1,7 +1,7 @@
 //! What is noticed of a fit.
 
 use super::estimate::EstimatorAccount;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
 use crate::note::{FitNote, NumberWithStd};
 use cft_ident_core::inertia::instruments::ReferenceSource;
@@ -45,8 +45,8 @@ impl EstimatorAccount {
 const SHOWN_AT_REST: f64 = 0.01;
 
 /// Rows at rest that are not fitted.
-pub(crate) fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<FitNote> {
-    let names = machine.robot.joint_names().iter().cloned();
+pub(crate) fn rests(setup: &RobotSetup, shares: &[f64]) -> Option<FitNote> {
+    let names = setup.robot.joint_names().iter().cloned();
     let joints = names.zip(shares.iter().copied());
     let joints: Vec<(String, f64)> = joints
         .filter(|(_, share)| *share >= SHOWN_AT_REST)

@@ -7,7 +7,7 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknown_key::key_of;
 use cft_ident_core::diagnose::{ModelProposal, Unknown, value_of};
 use cft_ident_core::effect::AugmentedModel;
@@ -20,7 +20,7 @@ use cft_ident_logs::recording::TorqueCourse;
 
 /// How the declared numbers of a proposal are fitted.
 pub(crate) struct OwnRefit<'a> {
-    pub machine: &'a LoggedRobot,
+    pub setup: &'a RobotSetup,
     pub given: &'a GivenModel,
     /// The logs that are fitted.
     pub logs: &'a [LogData],
@@ -95,9 +95,9 @@ impl OwnRefit<'_> {
             hold_friction: own.hold_friction,
             ..LsqSettings::default()
         };
-        let data = Dataset::new(self.machine, &self.logs_without(model));
+        let data = Dataset::new(self.setup, &self.logs_without(model));
         let found = lsq(&data, &settings, &self.control.quiet())?;
-        Ok(found.model(self.machine, own.friction.as_ref().map(|given| &given.file)))
+        Ok(found.model(self.setup, own.friction.as_ref().map(|given| &given.file)))
     }
 
     /// The logs less the torques of a model's effects.

@@ -16,7 +16,7 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::{InMemory, read_whole};
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{ModelNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::bandwidth;
@@ -70,22 +70,22 @@ pub fn payload(
     given: &GivenModel,
     control: &Control,
 ) -> Result<Payload, IdentifyError> {
-    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
     let (name, file, model) = (given.name.as_str(), &given.file, &given.numbers()?);
-    let robot = &machine.robot;
+    let robot = &setup.robot;
     if robot.tool_stays_level() {
         return Err(IdentifyError::NoPayload {
             model: name.to_owned(),
         });
     }
-    let whole = read_whole(machine, logs, control)?;
-    machine.check_temperatures(model, logs, &whole.stretches)?;
+    let whole = read_whole(setup, logs, control)?;
+    setup.check_temperatures(model, logs, &whole.stretches)?;
     let work = control.begin("payload", None);
-    let rows = rows(machine, model, &whole, name, control)?;
+    let rows = rows(setup, model, &whole, name, control)?;
     let covariance = inertial_covariance(file, model);
     let declared = has_declared_gains(file);
     let common = if declared { GAIN_DEVIATION } else { 0.0 };
-    let readings = [false, true].map(|gains| reading(machine, &rows, &covariance, (gains, common)));
+    let readings = [false, true].map(|gains| reading(setup, &rows, &covariance, (gains, common)));
     let readings = readings.into_iter().collect::<Result<Vec<_>, _>>()?;
     drop(work);
     control.check()?;
@@ -120,15 +120,15 @@ fn inertial_covariance(file: &ModelFile, model: &AugmentedModel) -> DMatrix<f64>
 }
 
 fn rows(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     model: &AugmentedModel,
     whole: &InMemory,
     name: &str,
     control: &Control,
 ) -> Result<Rows, IdentifyError> {
-    let (n, p) = (machine.robot.joints(), model.model.theta.len());
+    let (n, p) = (setup.robot.joints(), model.model.theta.len());
     let failed = |error| IdentifyError::motion(name, error);
-    let filters = ParallelFilters::design(&machine.settings(), &whole.stretches).map_err(failed)?;
+    let filters = ParallelFilters::design(&setup.settings(), &whole.stretches).map_err(failed)?;
     let mut out = Rows {
         joints: vec![Vec::new(); n],
         blocks: Vec::new(),
@@ -148,7 +148,7 @@ fn rows(
         for (j, hat) in hat.iter().enumerate() {
             // a joint that rests takes any torque up to its Coulomb level
             let weights = filter.weights(stretch, j, whole.rest_speed[j]);
-            let channels = channels(machine, model, stretch, (j, hat), &weights);
+            let channels = channels(setup, model, stretch, (j, hat), &weights);
             let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
             let filtered = filter.run(&channels).map_err(failed)?;
             let kept = 0..filter.rows(stretch.len());
@@ -169,13 +169,13 @@ fn rows(
 
 /// Channels of one joint along a stretch: entries, model, what it leaves, weight, then the regressor.
 fn channels(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     model: &AugmentedModel,
     stretch: &Stretch,
     (j, hat): (usize, &[f64]),
     weights: &[f64],
 ) -> Vec<Vec<f64>> {
-    let (n, p) = (machine.robot.joints(), model.model.theta.len());
+    let (n, p) = (setup.robot.joints(), model.model.theta.len());
     let mut out = vec![Vec::with_capacity(stretch.len()); OWN + 3 + p];
     let mut regressor = vec![0.0; n * p];
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -183,7 +183,7 @@ fn channels(
         stretch.at(k, &mut q, &mut v, &mut a);
         model.model.robot.regressor(&q, &v, &a, &mut regressor);
         let weight = weights[k];
-        let body = machine.robot.tool_row(j, &q, &v, &a);
+        let body = setup.robot.tool_row(j, &q, &v, &a);
         let own = [v[j], sign(v[j]), 1.0, *hat, stretch.tau[j][k] - hat];
         let all = body.into_iter().chain(own).map(|x| weight * x);
         let rest = regressor[j * p..(j + 1) * p].iter().map(|x| weight * x);
@@ -238,12 +238,12 @@ impl Point {
 }
 
 fn reading(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     rows: &Rows,
     covariance: &DMatrix<f64>,
     (gains, common): (bool, f64),
 ) -> Result<PayloadReading, IdentifyError> {
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     let u = STANDARD + 3 * n + if gains { n } else { 0 };
     let mut weights = vec![1.0; n];
     let mut theta = DVector::zeros(u);
@@ -309,7 +309,7 @@ fn reading(
     spread
         .view_mut((0, 0), (STANDARD, STANDARD))
         .copy_from(&body);
-    Ok(payload_of(machine, rows, &theta, &spread, &open, gains))
+    Ok(payload_of(setup, rows, &theta, &spread, &open, gains))
 }
 
 /// What a joint's rows leave.
@@ -403,14 +403,14 @@ fn interval(value: f64, variance: f64, open: bool, unit: &str) -> IntervalNumber
 }
 
 fn payload_of(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     rows: &Rows,
     theta: &DVector<f64>,
     spread: &DMatrix<f64>,
     open: &[bool],
     gains: bool,
 ) -> PayloadReading {
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     let standard: [f64; STANDARD] = std::array::from_fn(|i| theta[i]);
     let body = Body::of(&standard);
     // slopes of centre and inertia by the standard parameters, differenced: they are smooth where there is a mass
@@ -431,7 +431,7 @@ fn payload_of(
     };
     let centre = std::array::from_fn(|i| number(&|b| b.centre[i], &[6 + i, 9], "m"));
     let inertia = std::array::from_fn(|i| number(&|b| b.inertia[i], &[i, 6, 7, 8, 9], "kg m^2"));
-    let names = machine.robot.joint_names();
+    let names = setup.robot.joint_names();
     let gain = |j: usize| {
         let at = STANDARD + 3 * n + j;
         GainOff {

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::diagnose::{FreeParameters, LogRole};
 use cft_ident_core::effect::{AugmentedModel, stationary_joints};
 use cft_ident_core::motion::Stretch;
@@ -13,12 +13,12 @@ use cft_ident_files::config::ModelFile;
 
 /// Which parameters the fit may move: all but those that the friction stage left open; held friction by its prior.
 pub(crate) fn open(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     file: &ModelFile,
     given: &AugmentedModel,
     hold_friction: bool,
 ) -> FreeParameters {
-    let joints = machine.robot.joint_names();
+    let joints = setup.robot.joint_names();
     let friction = joints
         .iter()
         .zip(&given.model.friction)

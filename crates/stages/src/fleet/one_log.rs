@@ -7,9 +7,9 @@ use crate::fit::estimate::estimate;
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::passes::LogPasses;
 use crate::input::reduced::reduced_log::ReducedLog;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::columns;
 use cft_ident_core::inertia::solve::Fit;
 use cft_ident_core::verdict::Verdict;
@@ -86,26 +86,26 @@ impl Source {
     ) -> Result<Self, IdentifyError> {
         let name = format!("the robot file of {}", part.name().replace('.', "-"));
         let file = RobotFile::parse(&name, &part.made_with.robot_file)?;
-        let machine = LoggedRobot::new(&name, file);
-        part.belongs_to_robot(&machine.file)?;
+        let setup = RobotSetup::new(&name, file);
+        part.belongs_to_robot(&setup.file)?;
         let log = LogData::Reduced(part.clone());
         let known = part.known_friction();
-        let linear = columns(&machine, known.as_deref());
-        let mut passes = LogPasses::new(&machine, from_ref(&log), control);
+        let linear = columns(&setup, known.as_deref());
+        let mut passes = LogPasses::new(&setup, from_ref(&log), control);
         let found = match estimate(&mut passes, linear.clone(), EstimatorKind::Wls, false) {
             Ok(found) => Some(found.fit),
             // a log that says nothing is a log that says nothing
             Err(IdentifyError::Fit(_)) => None,
             Err(error) => return Err(error),
         };
-        let robot = &machine.robot;
+        let robot = &setup.robot;
         let inertial = robot.parameters().iter().map(|info| {
-            let unit = inertia_unit(robot, &info.unit, machine.file.inertial_torque_unit());
+            let unit = inertia_unit(robot, &info.unit, setup.file.inertial_torque_unit());
             (info.name.to_string(), None, unit)
         });
         let joints = robot.joint_names().iter().enumerate();
         let own = joints.flat_map(|(j, joint)| {
-            let unit = machine.file.torque_unit(j);
+            let unit = setup.file.torque_unit(j);
             linear.own[j].iter().map(move |own| {
                 let unit = friction_unit(robot, j, own.name(), unit);
                 (own.name().to_owned(), Some(joint.clone()), unit)

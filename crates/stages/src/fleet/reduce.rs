@@ -42,21 +42,21 @@ pub fn reduce(
     friction: Option<&GivenModel>,
     control: &Control,
 ) -> Result<ReducedLogs, IdentifyError> {
-    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
     let friction = friction.map(|given| (given.name.as_str(), &given.file));
-    machine.check_gains()?;
-    each_row_once(machine, &[("reduce", logs)])?;
-    if friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh {
+    setup.check_gains()?;
+    each_row_once(setup, &[("reduce", logs)])?;
+    if friction.is_none() && setup.file.friction_law() == FrictionLawKind::DoubleTanh {
         return Err(IdentifyError::LawIsNotLinear {
             estimator: "reduce",
         });
     }
     let before = friction
-        .map(|given| FrictionBefore::of(machine, given, logs, (EstimatorKind::Wls, true), control));
+        .map(|given| FrictionBefore::of(setup, given, logs, (EstimatorKind::Wls, true), control));
     let known = before.transpose()?.map(|before| before.known);
-    let made_with = MadeWith::of(&machine.file, friction.map(|f| f.0).zip(known.as_deref()));
+    let made_with = MadeWith::of(&setup.file, friction.map(|f| f.0).zip(known.as_deref()));
     let made_with = Arc::new(made_with);
-    let linear = columns(machine, known.as_deref());
+    let linear = columns(setup, known.as_deref());
     let laws: Vec<Option<JointFriction>> = (linear.known.iter())
         .map(|known| Some(JointFriction::DoubleTanh(known.as_ref()?.law)))
         .collect();
@@ -69,9 +69,9 @@ pub fn reduce(
             continue;
         }
         let one = std::slice::from_ref(log);
-        let own = machine.own_settings(one, &laws, control)?;
-        let fastest = machine.fastest(one)?;
-        let mut passes = LogPasses::new(machine, one, control).each_by_itself(own.clone());
+        let own = setup.own_settings(one, &laws, control)?;
+        let fastest = setup.fastest(one)?;
+        let mut passes = LogPasses::new(setup, one, control).each_by_itself(own.clone());
         let declared = passes.read_condensed(&linear)?;
         let narrower = passes.read(PositionFilter::Narrower, &linear.with_torque_rates(), None)?;
         let mut shifted = Vec::new();

@@ -11,10 +11,10 @@ use crate::input::error::IdentifyError;
 use crate::input::in_memory::{InMemory, read_whole};
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::refined_or_friction;
 use crate::input::position_cutoff::known;
 use crate::input::repeated::repeated_rows;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{ModelNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::friction::estimate::FrictionCurvePoint;
@@ -45,7 +45,7 @@ pub struct TriedOnLogs {
 
 /// Result of the comparison.
 pub struct Compared {
-    pub machine: LoggedRobot,
+    pub setup: RobotSetup,
     pub sides: [ComparedFile; 2],
     pub table: SideBySide,
     pub curves: Vec<FrictionCurves>,
@@ -234,15 +234,15 @@ pub fn compare(
     let sides = [side(a, !logs.is_empty())?, side(b, !logs.is_empty())?];
     one_robot(sides.each_ref())?;
     let first = &sides[0].given;
-    let machine = first.machine();
+    let setup = first.setup();
     let cautions = cautions(sides.each_ref(), !logs.is_empty()).into_iter();
     let mut notes: Vec<StageNote> = cautions.map(StageNote::Model).collect();
-    notes.extend(repeated_rows(logs, Some(&machine.file.layout())));
+    notes.extend(repeated_rows(logs, Some(&setup.file.layout())));
     let tried = match logs {
         [] => None,
         logs => {
-            let logs = LogData::read_all(&machine, logs, &[], control)?;
-            Some(on_logs(&machine, &sides, &logs, control)?)
+            let logs = LogData::read_all(&setup, logs, &[], control)?;
+            Some(on_logs(&setup, &sides, &logs, control)?)
         }
     };
     if let Some(tried) = &tried {
@@ -250,8 +250,8 @@ pub fn compare(
     }
     Ok(Compared {
         table: compare::side_by_side(&sides[0].given.file, &sides[1].given.file),
-        curves: curves(&machine, &sides, tried.as_ref()),
-        machine,
+        curves: curves(&setup, &sides, tried.as_ref()),
+        setup,
         sides,
         tried,
         notes,
@@ -259,20 +259,20 @@ pub fn compare(
 }
 
 fn on_logs(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     sides: &[ComparedFile; 2],
     logs: &[LogData],
     control: &Control,
 ) -> Result<TriedOnLogs, IdentifyError> {
     // one motion for both models: that of the first
     let laws = known(&sides[0].model.model);
-    let machine = &machine.with_position_cutoffs(logs, &laws, control)?;
-    let in_memory = read_whole(machine, logs, control)?;
+    let setup = &setup.with_position_cutoffs(logs, &laws, control)?;
+    let in_memory = read_whole(setup, logs, control)?;
     for side in sides {
-        machine.check_temperatures(&side.model, logs, &in_memory.stretches)?;
+        setup.check_temperatures(&side.model, logs, &in_memory.stretches)?;
     }
-    let settings = machine.settings();
-    let named = |error| IdentifyError::motion(&machine.name, error);
+    let settings = setup.settings();
+    let named = |error| IdentifyError::motion(&setup.name, error);
     let validation = |side: &ComparedFile| {
         let mut all = TorqueReconstruction::new(&side.model.model, &in_memory.rest_speed, None);
         for (segment, stretch) in in_memory.stretches.iter().enumerate() {
@@ -281,7 +281,7 @@ fn on_logs(
                 .map_err(named)?;
         }
         let mut validation = all.finish(in_memory.summary.clone());
-        machine.name_units(&mut validation.errors);
+        setup.name_units(&mut validation.errors);
         Ok::<_, IdentifyError>(validation)
     };
     let validations = [validation(&sides[0])?, validation(&sides[1])?];
@@ -299,11 +299,11 @@ fn on_logs(
 
 /// Friction of the joints where a model has some.
 fn curves(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     sides: &[ComparedFile; 2],
     tried: Option<&TriedOnLogs>,
 ) -> Vec<FrictionCurves> {
-    let robot = &machine.robot;
+    let robot = &setup.robot;
     let joints = robot.joint_names().iter().enumerate();
     joints
         .filter_map(|(j, joint)| {
@@ -326,7 +326,7 @@ fn curves(
             Some(FrictionCurves {
                 joint: joint.clone(),
                 speed_unit: format!("{}/s", robot.joint_kind(j).position_unit()),
-                torque_unit: machine.file.torque_unit(j).to_owned(),
+                torque_unit: setup.file.torque_unit(j).to_owned(),
                 most,
                 speeds_from,
                 laws,

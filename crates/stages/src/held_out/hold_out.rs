@@ -5,8 +5,8 @@ use crate::band::{self, Deviation, Directions, Error, Folds, FreeColumns, held_o
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{FitNote, StageNote};
 use crate::observe::{KEPT, Observer, QuietSample, QuietTorques};
 use cft_ident_core::effect::AugmentedModel;
@@ -72,22 +72,22 @@ impl Pieces {
 
 /// Sets blocks of the fitted logs aside, one after the other; `machine` has the position cut-offs of the fit.
 pub(crate) fn hold_out(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     (file, model): (&ModelFile, &AugmentedModel),
     (logs, inputs): (&[LogData], &[Provenance]),
     control: &Control,
 ) -> Result<Held, IdentifyError> {
-    Trial::new(machine, (file, model), (logs, inputs), control).run(FOLDS)
+    Trial::new(setup, (file, model), (logs, inputs), control).run(FOLDS)
 }
 
 /// The same of logs that the model has nothing from.
 pub(crate) fn on_other_logs(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     (file, model): (&ModelFile, &AugmentedModel),
     logs: &[LogData],
     control: &Control,
 ) -> Result<(Held, Vec<Provenance>), IdentifyError> {
-    let machine = &machine.with_position_cutoffs(logs, &known(&model.model), control)?;
+    let setup = &setup.with_position_cutoffs(logs, &known(&model.model), control)?;
     let mut inputs = Vec::new();
     for log in logs {
         let mut open = log.open(control)?;
@@ -95,19 +95,19 @@ pub(crate) fn on_other_logs(
         while open.read(&mut block)? {}
         inputs.push(open.provenance()?);
     }
-    let held = Trial::new(machine, (file, model), (logs, &inputs), control).run(1)?;
+    let held = Trial::new(setup, (file, model), (logs, &inputs), control).run(1)?;
     Ok((held, inputs))
 }
 
 /// Logs smoothed by these settings; of long ones pieces all along them.
 pub(crate) fn read_pieces(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     settings: &FilterSettings,
     model: &AugmentedModel,
     (logs, inputs): (&[LogData], &[Provenance]),
     control: &Control,
 ) -> Result<Vec<Stretch>, IdentifyError> {
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     let pieces = Pieces::of_each(MOST_ROWS, inputs);
     let mut all = Vec::new();
     for ((index, log), pieces) in logs.iter().enumerate().zip(&pieces) {
@@ -123,7 +123,7 @@ pub(crate) fn read_pieces(
         .map_err(|e| open.ended(e))?;
         open.count_run_time(&mut found);
         if model.takes_temperatures() {
-            let temperatures = machine.temperatures_for(model, log)?;
+            let temperatures = setup.temperatures_for(model, log)?;
             for stretch in &mut found {
                 stretch.temperature = temperatures.along(&stretch.t, n);
             }
@@ -134,7 +134,7 @@ pub(crate) fn read_pieces(
 }
 
 struct Trial<'a> {
-    machine: &'a LoggedRobot,
+    setup: &'a RobotSetup,
     settings: FilterSettings,
     file: &'a ModelFile,
     model: &'a AugmentedModel,
@@ -146,15 +146,15 @@ struct Trial<'a> {
 
 impl<'a> Trial<'a> {
     fn new(
-        machine: &'a LoggedRobot,
+        setup: &'a RobotSetup,
         (file, model): (&'a ModelFile, &'a AugmentedModel),
         (logs, inputs): (&'a [LogData], &'a [Provenance]),
         control: &'a Control,
     ) -> Self {
         let inputs = &inputs[..logs.len().min(inputs.len())];
         Self {
-            machine,
-            settings: machine.settings(),
+            setup,
+            settings: setup.settings(),
             file,
             model,
             logs,
@@ -167,14 +167,14 @@ impl<'a> Trial<'a> {
     fn run(&self, folds: usize) -> Result<Held, IdentifyError> {
         let work = self.control.begin("held-out data", None);
         let logs = (self.logs, self.inputs);
-        let stretches = read_pieces(self.machine, &self.settings, self.model, logs, self.control)?;
+        let stretches = read_pieces(self.setup, &self.settings, self.model, logs, self.control)?;
         let folds = Folds::of(&stretches, folds);
         let failed = |error| IdentifyError::motion(&self.logs[0].name(), error);
         let models = match folds.count() {
             1 => vec![self.model.clone()],
             _ => {
                 let filters = ParallelFilters::design(&self.settings, &stretches);
-                let speeds = self.machine.rest_speeds(self.logs)?;
+                let speeds = self.setup.rest_speeds(self.logs)?;
                 without_each(
                     self.model,
                     &self.free(),
@@ -196,7 +196,7 @@ impl<'a> Trial<'a> {
 
     /// Whether the logs gave a joint's friction and offset: what one-joint logs gave is not theirs.
     fn free(&self) -> FreeColumns {
-        let joints = self.machine.robot.joint_names();
+        let joints = self.setup.robot.joint_names();
         let laws = joints.iter().zip(&self.model.model.friction);
         let friction = laws.map(|(joint, law)| {
             let known = self.file.friction_prior.iter().any(|p| p.joint == *joint);
@@ -218,7 +218,7 @@ impl<'a> Trial<'a> {
         folds: &Folds,
         models: &[AugmentedModel],
     ) -> Vec<HeldOut> {
-        let n = self.machine.robot.joints();
+        let n = self.setup.robot.joints();
         let samples: usize = stretches.iter().map(Stretch::len).sum();
         let every = samples.div_ceil(MOST_ERRORS).max(1);
         let model = &self.model.model;
@@ -257,7 +257,7 @@ impl<'a> Trial<'a> {
         }
         let dt = stretches.first().map_or(1e-3, |s| s.dt);
         let independent = (2.0 * self.settings.cutoff_hz * dt * every as f64).min(1.0);
-        let names = self.machine.robot.joint_names().iter();
+        let names = self.setup.robot.joint_names().iter();
         let plain = self.settings.plain_q_cutoff_hz(1.0 / dt);
         let all = names.zip(&errors).enumerate();
         all.map(|(j, (joint, errors))| {
@@ -288,7 +288,7 @@ impl<'a> Trial<'a> {
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
             let mut open = log.open(self.control)?;
-            let temperatures = (self.machine).temperatures_for(self.model, log)?;
+            let temperatures = (self.setup).temperatures_for(self.model, log)?;
             let mut watched: Vec<Watched> = (models.iter().enumerate())
                 .map(|(fold, model)| Watched::new((index, fold), (model, &uncertain), &settings))
                 .collect::<Result<_, _>>()

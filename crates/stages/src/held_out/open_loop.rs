@@ -5,8 +5,8 @@ use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_each;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::{ModelNote, StageNote};
 use crate::open_loop::{self, FreeRun, OpenLoop, RunSpan, WindowLength, along};
 use cft_ident_core::effect::AugmentedModel;
@@ -18,23 +18,23 @@ const WINDOW_S: f64 = 0.25;
 
 /// Simulates the motion of logs from their torques, in windows that begin at measured states.
 pub(crate) fn open_loop(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     refined: &AugmentedModel,
     logs: &[LogData],
     window: Option<f64>,
     control: &Control,
 ) -> Result<OpenLoop, IdentifyError> {
-    let machine = &machine.with_position_cutoffs(logs, &known(&refined.model), control)?;
+    let setup = &setup.with_position_cutoffs(logs, &known(&refined.model), control)?;
     let settings = FilterSettings {
         q_trim_s: Some(0.0),
         trim_s: Some(0.0),
-        ..machine.settings()
+        ..setup.settings()
     };
-    let whole = read_each(machine, &vec![settings; logs.len()], logs, control)?;
-    machine.check_temperatures(refined, logs, &whole.stretches)?;
+    let whole = read_each(setup, &vec![settings; logs.len()], logs, control)?;
+    setup.check_temperatures(refined, logs, &whole.stretches)?;
     let length = match window {
         Some(s) => WindowLength::Seconds(s),
-        None if machine.robot.joints() == 1 => WindowLength::Whole,
+        None if setup.robot.joints() == 1 => WindowLength::Whole,
         None => WindowLength::Seconds(WINDOW_S),
     };
     let _work = control.begin("open loop", None);
@@ -43,30 +43,30 @@ pub(crate) fn open_loop(
 
 /// The free run of a model on logs that were read as `inputs`, where units and length allow one.
 pub(crate) fn free_run(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     refined: &AugmentedModel,
     (logs, inputs): (&[LogData], &[Provenance]),
     control: &Control,
 ) -> Result<Option<FreeRun>, IdentifyError> {
-    if !is_in_si(machine) || logs.iter().any(|log| log.reduced().is_some()) {
+    if !is_in_si(setup) || logs.iter().any(|log| log.reduced().is_some()) {
         return Ok(None);
     }
-    let machine = &machine.with_position_cutoffs(logs, &known(&refined.model), control)?;
+    let setup = &setup.with_position_cutoffs(logs, &known(&refined.model), control)?;
     let settings = FilterSettings {
         trim_s: Some(0.0),
-        ..machine.settings()
+        ..setup.settings()
     };
-    let stretches = read_pieces(machine, &settings, refined, (logs, inputs), control)?;
+    let stretches = read_pieces(setup, &settings, refined, (logs, inputs), control)?;
     let _work = control.begin("free run", None);
     let spans = whole(&stretches);
     Ok(open_loop::free_run(refined, None, &stretches, &spans))
 }
 
 /// Whether every torque is in N or N m: of several joints in other units no motion follows.
-pub(crate) fn is_in_si(machine: &LoggedRobot) -> bool {
-    let robot = &machine.robot;
-    let unit = |j: usize| machine.file.torque_unit(j) == robot.joint_kind(j).torque_unit();
-    machine.file.without_gains().is_empty() && (0..robot.joints()).all(unit)
+pub(crate) fn is_in_si(setup: &RobotSetup) -> bool {
+    let robot = &setup.robot;
+    let unit = |j: usize| setup.file.torque_unit(j) == robot.joint_kind(j).torque_unit();
+    setup.file.without_gains().is_empty() && (0..robot.joints()).all(unit)
 }
 
 /// Every stretch from its begin to its end.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::validate::JointError;
 
 /// A joint's residual relative to its torque, a fraction.
@@ -15,8 +15,8 @@ pub struct RelativeError {
 
 impl RelativeError {
     /// The errors of a robot's joints.
-    pub(crate) fn each(machine: &LoggedRobot, errors: &[f64]) -> Vec<Self> {
-        let joints = machine.robot.joint_names().iter().zip(errors);
+    pub(crate) fn each(setup: &RobotSetup, errors: &[f64]) -> Vec<Self> {
+        let joints = setup.robot.joint_names().iter().zip(errors);
         let of = |(joint, relative_error): (&String, &f64)| RelativeError {
             joint: joint.clone(),
             relative_error: *relative_error,

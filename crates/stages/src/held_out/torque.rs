@@ -9,8 +9,8 @@ use crate::input::dataset::GivenModel;
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::position_cutoff::known;
+use crate::input::robot_setup::RobotSetup;
 use crate::note::StageNote;
 use cft_ident_core::motion::{self, FilterSettings, Summary};
 use cft_ident_core::robot::model::Model;
@@ -54,25 +54,25 @@ pub fn torque(
     control: &Control,
     row: &mut dyn FnMut(f64, &[f64], Instant),
 ) -> Result<FeedForward, IdentifyError> {
-    let (machine, file, refined) = (&given.machine(), &given.file, &given.numbers()?);
+    let (setup, file, refined) = (&given.setup(), &given.file, &given.numbers()?);
     let model = &refined.model;
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     let band = Band::new(file, model);
-    let deviation = TorqueDeviations::new(machine, file, model);
+    let deviation = TorqueDeviations::new(setup, file, model);
     // torque, deviation, and half the band's width
     let kinds = if band.is_some() { 3 } else { 2 };
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
-    let log = &LogData::read_positions(machine, log, control)?;
+    let log = &LogData::read_positions(setup, log, control)?;
     let logs = std::slice::from_ref(log);
-    let machine = &machine.with_cutoffs_along(logs, &known(model), &vec![0.0; n], control)?;
-    let as_held = machine.as_held(&file.held_out);
-    let machine = as_held.as_ref().unwrap_or(machine);
+    let setup = &setup.with_cutoffs_along(logs, &known(model), &vec![0.0; n], control)?;
+    let as_held = setup.as_held(&file.held_out);
+    let setup = as_held.as_ref().unwrap_or(setup);
     // every row gets its torque: nothing is decimated, and nothing left off at the ends
     let settings = FilterSettings {
         decimation: Some(1),
         q_trim_s: Some(0.0),
         trim_s: Some(0.0),
-        ..machine.settings()
+        ..setup.settings()
     };
     let work = control.begin("torque", None);
     let mut open = log.open(control)?;
@@ -107,7 +107,7 @@ pub fn torque(
     } else {
         // effects remember: they need a stretch from its begin
         let (found, summary) = motion::stretches(0, n, &settings, &mut read).map_err(failed)?;
-        let temperatures = machine.temperatures_for(refined, log)?;
+        let temperatures = setup.temperatures_for(refined, log)?;
         let mut values = vec![0.0; kinds * n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for mut stretch in found {
@@ -135,10 +135,10 @@ pub fn torque(
     notes.extend(StageNote::of_reach(reach.as_ref()));
     let inputs = vec![open.provenance()?];
     let rows = summary.rows.max(1) as f64;
-    let names = machine.robot.joint_names().iter().enumerate();
+    let names = setup.robot.joint_names().iter().enumerate();
     let joints = names.map(|(j, joint)| JointAlong {
         joint: joint.clone(),
-        unit: machine.file.torque_unit(j).to_owned(),
+        unit: setup.file.torque_unit(j).to_owned(),
         rms: (square[j] / rows).sqrt(),
         peak: peak[j],
     });
@@ -161,8 +161,8 @@ struct TorqueDeviations<'a> {
 }
 
 impl<'a> TorqueDeviations<'a> {
-    fn new(machine: &LoggedRobot, file: &ModelFile, model: &'a Model) -> Self {
-        let joints = machine.robot.joint_names().iter();
+    fn new(setup: &RobotSetup, file: &ModelFile, model: &'a Model) -> Self {
+        let joints = setup.robot.joint_names().iter();
         let residual = joints.map(|j| file.residual_std.get(j).copied().unwrap_or(0.0));
         TorqueDeviations {
             of_parameters: Deviation::new(&file.model_covariance(model), model),

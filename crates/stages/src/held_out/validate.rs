@@ -11,13 +11,13 @@ use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_whole;
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
-use crate::input::logged_robot::LoggedRobot;
 use crate::input::model::refined;
 use crate::input::of_robot::{JointRanges, TorquePeaks};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::ReducedLog;
 use crate::input::repeated::repeated_rows;
+use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::columns;
 use crate::note::{ModelNote, StageNote};
 use crate::open_loop::{FreeRun, OpenLoop};
@@ -136,10 +136,10 @@ pub fn validate(
     let refined = &settings.model.numbers()?;
     let mut found = errors_of(data, (refined, &settings.model.file), control, row)?;
     if settings.free_run {
-        found.free_run = free_run(&data.machine, refined, (logs, &found.inputs), control)?;
+        found.free_run = free_run(&data.setup, refined, (logs, &found.inputs), control)?;
     }
     if let Some(window) = settings.open_loop {
-        let simulated = open_loop(&data.machine, refined, logs, window, control)?;
+        let simulated = open_loop(&data.setup, refined, logs, window, control)?;
         if simulated.astray > 0 {
             found.notes.push(StageNote::Model(ModelNote::Astray {
                 astray: simulated.astray,
@@ -153,25 +153,18 @@ pub fn validate(
 
 /// The errors of a model on the logs that it was fitted to, as [`validate`] gives them.
 pub(crate) fn errors_on_fitted(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     file: &ModelFile,
     logs: &[LogData],
     control: &Control,
 ) -> Result<TorqueErrors, IdentifyError> {
-    let model = refined(file, &machine.name)?;
+    let model = refined(file, &setup.name)?;
     let whole = not_reduced(logs);
-    let machine = match whole.is_empty() {
-        true => machine.clone(),
-        false => machine.with_position_cutoffs(&whole, &known(&model.model), control)?,
+    let setup = match whole.is_empty() {
+        true => setup.clone(),
+        false => setup.with_position_cutoffs(&whole, &known(&model.model), control)?,
     };
-    let found = reconstruct(
-        &machine,
-        (&model, file),
-        None,
-        logs,
-        control,
-        &mut |_, _| {},
-    )?;
+    let found = reconstruct(&setup, (&model, file), None, logs, control, &mut |_, _| {})?;
     Ok(found.validation.errors)
 }
 
@@ -181,21 +174,21 @@ fn errors_of(
     control: &Control,
     row: &mut dyn FnMut(&ReconstructedRow, Instant),
 ) -> Result<Validated, IdentifyError> {
-    let (machine, logs) = (&data.machine, data.logs.as_slice());
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
     let whole = not_reduced(logs);
-    let machine = match whole.is_empty() {
-        true => machine.clone(),
-        false => machine.with_position_cutoffs(&whole, &known(&refined.model), control)?,
+    let setup = match whole.is_empty() {
+        true => setup.clone(),
+        false => setup.with_position_cutoffs(&whole, &known(&refined.model), control)?,
     };
-    smoothed_alike(&machine, logs)?;
+    smoothed_alike(&setup, logs)?;
     let of_model = (refined, file);
     // a band is of single rows, which a reduced log has not
     let rows = whole.len() == logs.len();
     let band = Band::new(file, &refined.model).filter(|_| rows);
-    let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
+    let as_held = band.as_ref().and_then(|band| setup.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
-    let mut places = JointRanges::new(&machine);
-    let mut beyond = TorquePeaks::new(machine.robot.joints());
+    let mut places = JointRanges::new(&setup);
+    let mut beyond = TorquePeaks::new(setup.robot.joints());
     let mut seen = |r: &ReconstructedRow, origin: Instant| {
         places.take(r.q);
         beyond.take(r, origin);
@@ -205,9 +198,9 @@ fn errors_of(
         row(r, origin);
     };
     let mut found = match &as_held {
-        None => reconstruct(&machine, of_model, band.as_ref(), logs, control, &mut seen)?,
+        None => reconstruct(&setup, of_model, band.as_ref(), logs, control, &mut seen)?,
         Some(as_held) => {
-            let mut found = reconstruct(&machine, of_model, None, logs, control, &mut |_, _| {})?;
+            let mut found = reconstruct(&setup, of_model, None, logs, control, &mut |_, _| {})?;
             let mut second =
                 reconstruct(as_held, of_model, band.as_ref(), logs, control, &mut seen)?;
             for (errors, by_band) in found.every().zip(second.every()) {
@@ -219,10 +212,10 @@ fn errors_of(
             found
         }
     };
-    if let Some(other) = places.refused(&machine) {
+    if let Some(other) = places.refused(&setup) {
         return Err(other);
     }
-    if let Some(error) = beyond.impossible(found.judged(), &machine, logs) {
+    if let Some(error) = beyond.impossible(found.judged(), &setup, logs) {
         let error = error.to_string();
         let note = StageNote::Model(ModelNote::ImpossibleTorque { error });
         found.notes.insert(0, note);
@@ -248,14 +241,14 @@ pub fn not_a_validation(errors: &TorqueErrors) -> Option<StageNote> {
 }
 
 /// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
-fn smoothed_alike(machine: &LoggedRobot, logs: &[LogData]) -> Result<(), IdentifyError> {
+fn smoothed_alike(setup: &RobotSetup, logs: &[LogData]) -> Result<(), IdentifyError> {
     let parts: Vec<&ReducedLog> = logs.iter().filter_map(LogData::reduced).collect();
-    let Some(first) = parts.first().filter(|_| machine.finds_cutoffs()) else {
+    let Some(first) = parts.first().filter(|_| setup.finds_cutoffs()) else {
         return Ok(());
     };
     let together = match parts.len() == logs.len() {
         true => &first.own.cutoffs_hz,
-        false => &*machine.position_cutoffs_hz,
+        false => &*setup.position_cutoffs_hz,
     };
     for part in &parts {
         let own = &part.own.cutoffs_hz;
@@ -266,7 +259,7 @@ fn smoothed_alike(machine: &LoggedRobot, logs: &[LogData]) -> Result<(), Identif
                 log: part.name().to_owned(),
                 what: format!(
                     "{} as smoothed as the other logs (by {} Hz, and they by {} Hz): its own rows chose it",
-                    machine.robot.joint_names()[j],
+                    setup.robot.joint_names()[j],
                     number::significant(*own, 3),
                     number::significant(*other, 3),
                 ),
@@ -285,7 +278,7 @@ fn not_reduced(logs: &[LogData]) -> Vec<LogData> {
 }
 
 fn reconstruct(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     (refined, file): (&AugmentedModel, &ModelFile),
     band: Option<&Band>,
     logs: &[LogData],
@@ -297,16 +290,16 @@ fn reconstruct(
         |motion: [&[f64]; 3], tau: &[f64], out: &mut [f64]| band.half_widths(motion, tau, out)
     });
     let widths: Option<HalfWidths> = widths.as_ref().map(|widths| widths as HalfWidths);
-    let speeds = machine.rest_speeds(&not_reduced(logs))?;
+    let speeds = setup.rest_speeds(&not_reduced(logs))?;
     let mut all = TorqueReconstruction::new(&refined.model, &speeds, widths);
     let (mut inputs, mut last) = (Vec::new(), None);
     let sources: Vec<Log> = logs.iter().map(LogData::source).collect();
-    let mut notes = repeated_rows(&sources, Some(&machine.file.layout()));
-    let settings = machine.settings();
+    let mut notes = repeated_rows(&sources, Some(&setup.file.layout()));
+    let settings = setup.settings();
     let mut segments = 0;
     for log in logs {
         if let Some(part) = log.reduced() {
-            add_reduced(&mut all, machine, refined, part)?;
+            add_reduced(&mut all, setup, refined, part)?;
             notes.extend(part.notes.iter().cloned());
             inputs.push(part.provenance.clone());
             last = Some(part.summary.clone());
@@ -329,8 +322,8 @@ fn reconstruct(
         } else {
             // effects remember: they need a stretch from its begin
             let one = std::slice::from_ref(log);
-            let whole = read_whole(machine, one, control)?;
-            machine.check_temperatures(refined, one, &whole.stretches)?;
+            let whole = read_whole(setup, one, control)?;
+            setup.check_temperatures(refined, one, &whole.stretches)?;
             all.count_from(whole.origin.seconds());
             for stretch in &whole.stretches {
                 let hat = refined.reconstruct(stretch);
@@ -372,14 +365,14 @@ fn reconstruct(
         inputs,
         notes,
     };
-    found.every().for_each(|errors| machine.name_units(errors));
+    found.every().for_each(|errors| setup.name_units(errors));
     Ok(found)
 }
 
 /// Adds the errors of a model that is linear in the columns of a reduced log.
 fn add_reduced(
     all: &mut TorqueReconstruction,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     refined: &AugmentedModel,
     part: &ReducedLog,
 ) -> Result<(), IdentifyError> {
@@ -393,9 +386,9 @@ fn add_reduced(
         let what = "the rows that effects are computed along";
         return Err(needs(what, "give the log itself, or a model without effects").into());
     }
-    part.belongs_to_robot(&machine.file)?;
+    part.belongs_to_robot(&setup.file)?;
     let known = part.known_friction();
-    let columns = columns(machine, known.as_deref());
+    let columns = columns(setup, known.as_deref());
     for (j, friction) in model.friction.iter().enumerate() {
         let same = match (friction, columns.known[j].as_ref()) {
             (JointFriction::DoubleTanh(law), Some(known)) => {

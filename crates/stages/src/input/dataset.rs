@@ -6,15 +6,15 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::log_data::LogData;
-use super::logged_robot::LoggedRobot;
 use super::model::refined;
+use super::robot_setup::RobotSetup;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_files::config::ModelFile;
 
 /// A robot and its logs, by what they are for.
 #[derive(Debug, Clone)]
 pub struct Dataset {
-    pub machine: LoggedRobot,
+    pub setup: RobotSetup,
     /// Logs that are fitted; those that are looked at, where a stage fits nothing.
     pub logs: Vec<LogData>,
     /// Logs of one moving joint each, which a campaign gives to the friction filter.
@@ -29,12 +29,12 @@ impl Dataset {
     /// # Errors
     /// Logs that cannot be read.
     pub fn read(
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         logs: &[Log],
         control: &Control,
     ) -> Result<Self, IdentifyError> {
-        let logs = LogData::read_all(machine, logs, &[], control)?;
-        Ok(Self::new(machine, &logs))
+        let logs = LogData::read_all(setup, logs, &[], control)?;
+        Ok(Self::new(setup, &logs))
     }
 
     /// The same with logs that are held out.
@@ -42,7 +42,7 @@ impl Dataset {
     /// # Errors
     /// Logs that cannot be read.
     pub fn holding_out(self, held_out: &[Log], control: &Control) -> Result<Self, IdentifyError> {
-        let held_out = LogData::read_all(&self.machine, held_out, &[&self.logs], control)?;
+        let held_out = LogData::read_all(&self.setup, held_out, &[&self.logs], control)?;
         Ok(Dataset { held_out, ..self })
     }
 
@@ -50,23 +50,23 @@ impl Dataset {
     ///
     /// # Errors
     /// Logs that cannot be read by it.
-    pub fn of_robot(&self, machine: LoggedRobot, control: &Control) -> Result<Self, IdentifyError> {
+    pub fn of_robot(&self, setup: RobotSetup, control: &Control) -> Result<Self, IdentifyError> {
         let again = |logs: &[LogData]| {
-            let logs = logs.iter().map(|log| log.read_again(&machine, control));
+            let logs = logs.iter().map(|log| log.read_again(&setup, control));
             logs.collect::<Result<Vec<_>, _>>()
         };
         Ok(Dataset {
             logs: again(&self.logs)?,
             one_joint: again(&self.one_joint)?,
             held_out: again(&self.held_out)?,
-            machine,
+            setup,
         })
     }
 
     /// Logs that were read, all of them to be fitted or looked at.
-    pub fn new(machine: &LoggedRobot, logs: &[LogData]) -> Self {
+    pub fn new(setup: &RobotSetup, logs: &[LogData]) -> Self {
         Dataset {
-            machine: machine.clone(),
+            setup: setup.clone(),
             logs: logs.to_vec(),
             one_joint: Vec::new(),
             held_out: Vec::new(),
@@ -103,8 +103,8 @@ impl GivenModel {
     }
 
     /// The robot of the model, its set-up kept as it is declared where that of the model was.
-    pub fn machine(&self) -> LoggedRobot {
-        LoggedRobot::of_model(&self.name, &self.file)
+    pub fn setup(&self) -> RobotSetup {
+        RobotSetup::of_model(&self.name, &self.file)
     }
 
     /// What torques are computed with.

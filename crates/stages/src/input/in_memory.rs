@@ -3,7 +3,7 @@
 use super::control::Control;
 use super::error::IdentifyError;
 use super::log_data::LogData;
-use super::logged_robot::LoggedRobot;
+use super::robot_setup::RobotSetup;
 use crate::note::StageNote;
 use cft_ident_core::motion::{FilterSettings, Stretch, Summary, stretches};
 use cft_ident_logs::log::{Instant, Provenance};
@@ -30,26 +30,21 @@ pub struct InMemory {
 /// # Errors
 /// A log that cannot be read, or more samples than memory is meant to hold.
 pub fn read_whole(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     logs: &[LogData],
     control: &Control,
 ) -> Result<InMemory, IdentifyError> {
-    read_each(
-        machine,
-        &vec![machine.settings(); logs.len()],
-        logs,
-        control,
-    )
+    read_each(setup, &vec![setup.settings(); logs.len()], logs, control)
 }
 
 /// The same as [`read_whole`], each log with the settings in its place.
 pub(crate) fn read_each(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     settings: &[FilterSettings],
     logs: &[LogData],
     control: &Control,
 ) -> Result<InMemory, IdentifyError> {
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     let work = control.begin("reading", Some(logs.len() as u64));
     let (mut all, mut inputs, mut notes) = (Vec::new(), Vec::new(), Vec::new());
     let mut last: Option<Summary> = None;
@@ -76,7 +71,7 @@ pub(crate) fn read_each(
             });
         }
         notes.extend(open.notes_with(&summary));
-        notes.extend(machine.put_temperatures(log, &mut found)?);
+        notes.extend(setup.put_temperatures(log, &mut found)?);
         inputs.push(open.provenance()?);
         all.extend(found);
         last = Some(summary);
@@ -92,6 +87,6 @@ pub(crate) fn read_each(
         summary,
         origin,
         averaged,
-        rest_speed: machine.rest_speeds(logs)?,
+        rest_speed: setup.rest_speeds(logs)?,
     })
 }

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::logged_robot::LoggedRobot;
+use super::robot_setup::RobotSetup;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::model::Model;
 use cft_ident_core::robot::tree::pose::{driven, frames};
@@ -42,8 +42,8 @@ pub struct JointInUse {
 }
 
 /// The point that forces are reported at and its name: the first frame of the file, or the end of the last link.
-fn tool(file: &RobotFile, machine: &LoggedRobot, q: &[f64]) -> (Vector, String) {
-    let tree = machine.robot.tree();
+fn tool(file: &RobotFile, setup: &RobotSetup, q: &[f64]) -> (Vector, String) {
+    let tree = setup.robot.tree();
     let frames = frames(tree, q);
     let links = tree.links();
     let named = file.robot.frame.first().and_then(|frame| {
@@ -63,10 +63,10 @@ fn tool(file: &RobotFile, machine: &LoggedRobot, q: &[f64]) -> (Vector, String) 
 
 /// Levers of the tool about each joint at a pose \[m\], none for a joint that slides or whose lever is short; and
 /// what the point is called.
-pub fn levers(machine: &LoggedRobot, q: &[f64]) -> (Vec<Option<f64>>, String) {
-    let robot = &machine.robot;
+pub fn levers(setup: &RobotSetup, q: &[f64]) -> (Vec<Option<f64>>, String) {
+    let robot = &setup.robot;
     let tree = robot.tree();
-    let (point, name) = tool(&machine.file, machine, q);
+    let (point, name) = tool(&setup.file, setup, q);
     let frames = frames(tree, q);
     let links = driven(tree).into_iter().enumerate();
     let lever = |(j, link): (usize, usize)| {
@@ -95,16 +95,16 @@ pub(crate) fn middle(file: &ModelFile) -> Vec<f64> {
 /// What the errors of a model mean in use, and the point that forces are reported at; nothing where the file does not hold
 /// what it left of data set aside.
 pub fn in_use(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     file: &ModelFile,
     model: &Model,
 ) -> Option<(Vec<JointInUse>, String)> {
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     if file.held_out.len() != n {
         return None;
     }
     let q = middle(file);
-    let (levers, point) = levers(machine, &q);
+    let (levers, point) = levers(setup, &q);
     let still = vec![0.0; n];
     let (mut weight, mut tau) = (vec![0.0; n], vec![0.0; n]);
     model
@@ -120,11 +120,11 @@ pub fn in_use(
     let joints = file.held_out.iter().enumerate().map(|(j, held)| {
         let widths = held.half_width_95.iter().flatten();
         let half = widths.fold(0.0, |most: f64, x| most.max(*x));
-        let kind = machine.robot.joint_kind(j);
+        let kind = setup.robot.joint_kind(j);
         let inertia = inertia(j);
         JointInUse {
             joint: held.joint.clone(),
-            unit: machine.file.torque_unit(j).to_owned(),
+            unit: setup.file.torque_unit(j).to_owned(),
             torque_seen: held.torque_seen,
             half_width_95: half,
             lever_m: levers[j],

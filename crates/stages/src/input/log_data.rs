@@ -6,10 +6,10 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::free_swing::moves_freely;
 use super::log::{Log, arrays_layout, without_rows};
-use super::logged_robot::LoggedRobot;
 use super::open_log::OpenLog;
 use super::reduced::reduced_log::ReducedLog;
 use super::reference::LoggedReference;
+use super::robot_setup::RobotSetup;
 use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
 use cft_ident_logs::recording::{Recording, RecordingRequest, TorqueCourse};
 
@@ -33,16 +33,16 @@ impl LogData {
     /// # Errors
     /// Logs that cannot be read.
     pub fn read_all(
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         logs: &[Log],
         beside: &[&[LogData]],
         control: &Control,
     ) -> Result<Vec<Self>, IdentifyError> {
-        let layout = machine.file.layout();
+        let layout = setup.file.layout();
         let mut all: Vec<Self> = Vec::with_capacity(logs.len());
         for log in logs {
             let beside: Vec<&LogData> = beside.iter().copied().flatten().chain(&all).collect();
-            let read = Self::read_by(machine, log, &layout, &beside, control)?;
+            let read = Self::read_by(setup, log, &layout, &beside, control)?;
             all.push(read);
         }
         Ok(all)
@@ -52,12 +52,8 @@ impl LogData {
     ///
     /// # Errors
     /// A log that cannot be read.
-    pub fn read(
-        machine: &LoggedRobot,
-        log: &Log,
-        control: &Control,
-    ) -> Result<Self, IdentifyError> {
-        Self::read_by(machine, log, &machine.file.layout(), &[], control)
+    pub fn read(setup: &RobotSetup, log: &Log, control: &Control) -> Result<Self, IdentifyError> {
+        Self::read_by(setup, log, &setup.file.layout(), &[], control)
     }
 
     /// Reads a log for its positions alone: it needs no torque channels.
@@ -65,22 +61,22 @@ impl LogData {
     /// # Errors
     /// A log that cannot be read.
     pub fn read_positions(
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         log: &Log,
         control: &Control,
     ) -> Result<Self, IdentifyError> {
-        let layout = machine.file.layout().without_torques();
-        Self::read_by(machine, log, &layout, &[], control)
+        let layout = setup.file.layout().without_torques();
+        Self::read_by(setup, log, &layout, &[], control)
     }
 
     /// The same log by another robot file, less the same torques.
     pub(crate) fn read_again(
         &self,
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         control: &Control,
     ) -> Result<Self, IdentifyError> {
-        let layout = machine.file.layout();
-        let again = Self::read_by(machine, &self.source(), &layout, &[self], control)?;
+        let layout = setup.file.layout();
+        let again = Self::read_by(setup, &self.source(), &layout, &[self], control)?;
         Ok(match (self, again) {
             (Self::Recorded { recording: own, .. }, Self::Recorded { source, recording }) => {
                 let recording = Arc::unwrap_or_clone(recording).minus_torque_of(own);
@@ -94,7 +90,7 @@ impl LogData {
     }
 
     fn read_by(
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         log: &Log,
         layout: &Layout,
         beside: &[&LogData],
@@ -104,14 +100,14 @@ impl LogData {
             Self::Recorded { recording, .. } => Some(&**recording),
             Self::Reduced(_) => None,
         });
-        let (keep, stop) = (&machine.file.log.keep, || control.stopped());
+        let (keep, stop) = (&setup.file.log.keep, || control.stopped());
         let request = RecordingRequest {
             layout: match log {
-                Log::Arrays(_) => arrays_layout(layout, machine.robot.joint_names()),
+                Log::Arrays(_) => arrays_layout(layout, setup.robot.joint_names()),
                 _ => layout.clone(),
             },
-            references: machine.file.reference_layout(),
-            temperatures: machine.file.temperature_layout(),
+            references: setup.file.reference_layout(),
+            temperatures: setup.file.temperature_layout(),
             keep,
             stop: &stop,
             beside: &beside.collect::<Vec<_>>(),
@@ -125,15 +121,15 @@ impl LogData {
             LogError::Interrupted => IdentifyError::Interrupted,
             error => error.into(),
         })?;
-        let longest = |dt: f64| machine.settings().longest_step(dt);
+        let longest = |dt: f64| setup.settings().longest_step(dt);
         let mut read = read.cut_by(&longest);
-        if machine.file.zero_order_hold(read.layout().channels) {
-            read = read.held_by(machine.robot.clone());
+        if setup.file.zero_order_hold(read.layout().channels) {
+            read = read.held_by(setup.robot.clone());
         }
         let off = read.inspection.off();
         if !off.is_empty() && read.inspection.refusal().is_none() {
             let freely = keep.contains(&RowFault::StuckChannel)
-                || swings_freely(machine, (log, &read), &off, control)?;
+                || swings_freely(setup, (log, &read), &off, control)?;
             read.set_swings_freely(freely);
             read = read.cut_by(&longest);
         }
@@ -260,7 +256,7 @@ impl LogData {
     }
 }
 
-impl LoggedRobot {
+impl RobotSetup {
     /// Speed up to which each joint rests, by the log in which it moves most [m/s or rad/s].
     pub(crate) fn rest_speeds(&self, logs: &[LogData]) -> Result<Vec<f64>, IdentifyError> {
         self.greatest(logs, |log| Ok(&log.usable()?.rest_speed))
@@ -325,7 +321,7 @@ pub(crate) fn bridges(logs: &[LogData]) -> Result<bool, IdentifyError> {
 
 /// Whether the robot moves as without its motors where torques are exactly 0.
 fn swings_freely(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     (log, read): (&Log, &Recording),
     off: &[(usize, [f64; 2])],
     control: &Control,
@@ -333,11 +329,11 @@ fn swings_freely(
     let name = log.name();
     let mut open = OpenLog::new(&name, &Arc::new(read.clone()), read.blocks()?, control);
     // Behind coupled gears the motors' channels are not the joints'.
-    let n = machine.robot.joints();
+    let n = setup.robot.joints();
     let all = |(_, span): &(usize, [f64; 2])| (0..n).map(|j| (j, *span)).collect();
     let off = match open.layout().conversion.is_none() {
         true => off.to_vec(),
         false => off.iter().flat_map::<Vec<_>, _>(all).collect(),
     };
-    moves_freely(&machine.robot, &machine.settings(), &name, &mut open, &off)
+    moves_freely(&setup.robot, &setup.settings(), &name, &mut open, &off)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::error::IdentifyError;
-use super::logged_robot::LoggedRobot;
+use super::robot_setup::RobotSetup;
 use cft_ident_core::effect::{self, AugmentedModel, EffectNumber, Law, ModelEffect, formula, own};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::model::Model;
@@ -85,12 +85,12 @@ pub(crate) fn own_laws(
 /// An effect as a model file holds it.
 pub(crate) fn in_file(
     effect: &ModelEffect,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     numbers: &[EffectNumber],
 ) -> EffectSection {
     EffectSection {
         name: effect.name().to_owned(),
-        joint: effect.place.name(&machine.robot),
+        joint: effect.place.name(&setup.robot),
         shrinkage: None,
         accepted_by_user: false,
         parameters: numbers
@@ -109,9 +109,9 @@ pub(crate) fn in_file(
 }
 
 /// An empty model of the robot.
-pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) -> ModelFile {
+pub fn new_model(setup: &RobotSetup, command: &str, inputs: &[Provenance]) -> ModelFile {
     ModelFile {
-        robot: machine.file.clone(),
+        robot: setup.file.clone(),
         parameters: Vec::new(),
         covariance: None,
         residual_std: BTreeMap::new(),
@@ -128,7 +128,7 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: command.to_owned(),
             estimator: None,
-            as_declared: machine.as_declared,
+            as_declared: setup.as_declared,
             seed: None,
             inputs: inputs
                 .iter()

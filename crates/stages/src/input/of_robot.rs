@@ -2,7 +2,7 @@
 
 use super::error::IdentifyError;
 use super::log_data::LogData;
-use super::logged_robot::LoggedRobot;
+use super::robot_setup::RobotSetup;
 use cft_ident_core::number;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::validate::{ReconstructedRow, TorqueErrors};
@@ -26,14 +26,14 @@ pub(crate) struct JointRanges {
 }
 
 impl JointRanges {
-    pub(crate) fn new(machine: &LoggedRobot) -> Self {
-        let limits = machine.robot.joint_names().iter().map(|joint| {
-            let [low, high] = machine.file.limits.get(joint)?.position?;
+    pub(crate) fn new(setup: &RobotSetup) -> Self {
+        let limits = setup.robot.joint_names().iter().map(|joint| {
+            let [low, high] = setup.file.limits.get(joint)?.position?;
             let room = BEYOND_LIMITS_SHARE * (high - low);
             Some([low - room, high + room])
         });
         let limits: Vec<Option<[f64; 2]>> = limits.collect();
-        let turns = |j: usize| machine.robot.joint_kind(j) == JointKind::Revolute;
+        let turns = |j: usize| setup.robot.joint_kind(j) == JointKind::Revolute;
         Self {
             turning: (0..limits.len()).map(turns).collect(),
             seen: vec![[f64::INFINITY, f64::NEG_INFINITY]; limits.len()],
@@ -61,16 +61,16 @@ impl JointRanges {
     }
 
     /// The refusal of positions where a joint of this robot cannot stand.
-    pub(crate) fn refused(&self, machine: &LoggedRobot) -> Option<IdentifyError> {
+    pub(crate) fn refused(&self, setup: &RobotSetup) -> Option<IdentifyError> {
         let far = |j: &usize| self.beyond[*j] as f64 > ROWS_BEYOND_SHARE * self.rows as f64;
         let j = (0..self.limits.len()).find(far)?;
-        let joint = machine.robot.joint_names().get(j)?;
+        let joint = setup.robot.joint_names().get(j)?;
         let shown = |range: [f64; 2]| range.map(|x| number::significant(x, 4)).join("..");
         Some(IdentifyError::OtherRobotLog {
             joint: joint.clone(),
             positions: shown(self.seen[j]),
-            limits: shown(machine.file.limits.get(joint)?.position?),
-            unit: machine.robot.joint_kind(j).position_unit(),
+            limits: shown(setup.file.limits.get(joint)?.position?),
+            unit: setup.robot.joint_kind(j).position_unit(),
         })
     }
 }
@@ -107,7 +107,7 @@ impl TorquePeaks {
     pub(crate) fn impossible(
         &self,
         errors: &TorqueErrors,
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         logs: &[LogData],
     ) -> Option<IdentifyError> {
         let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
@@ -118,12 +118,12 @@ impl TorquePeaks {
         let (j, (measured, (torque, t))) = off.next()?;
         let names: Vec<String> = logs.iter().map(LogData::name).collect();
         Some(IdentifyError::Impossible {
-            joint: machine.robot.joint_names()[j].clone(),
+            joint: setup.robot.joint_names()[j].clone(),
             log: names.join(", "),
             t: *t,
             torque: *torque,
             measured: *measured,
-            unit: machine.file.torque_unit(j),
+            unit: setup.file.torque_unit(j),
         })
     }
 }

@@ -3,7 +3,7 @@
 use super::control::Control;
 use super::error::IdentifyError;
 use super::log_data::LogData;
-use super::logged_robot::{LoggedRobot, narrowed};
+use super::robot_setup::{RobotSetup, narrowed};
 use crate::note::StageNote;
 use cft_ident_core::friction::motions::motions;
 use cft_ident_core::friction::prepare::SmoothedMotion;
@@ -29,10 +29,10 @@ pub struct OneJointLog {
 }
 
 /// Smoothing of the motion that the friction filter takes as known.
-fn processing(machine: &LoggedRobot, rate_hz: f64) -> FilterSettings {
+fn processing(setup: &RobotSetup, rate_hz: f64) -> FilterSettings {
     FilterSettings {
         q_cutoff_hz: Some(
-            machine
+            setup
                 .file
                 .filter
                 .position_cutoff_hz
@@ -43,14 +43,14 @@ fn processing(machine: &LoggedRobot, rate_hz: f64) -> FilterSettings {
         q_trim_s: None,
         // the filter takes rows as they come, and needs none between
         bridge_s: 0.0,
-        ..machine.settings()
+        ..setup.settings()
     }
 }
 
 /// Reads a one-joint log into memory and smooths its motion, once as declared and once with a
 /// narrower filter, by which the smoothing's own part in an estimate is seen.
 pub fn read(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     log: &LogData,
     control: &Control,
 ) -> Result<OneJointLog, IdentifyError> {
@@ -72,10 +72,10 @@ pub fn read(
         (Some(first), Some(last)) if last > first => (whole.t.len() - 1) as f64 / (last - first),
         _ => 1.0,
     };
-    let declared = processing(machine, rate);
+    let declared = processing(setup, rate);
     let narrower = narrowed(&declared, rate);
     let smooth = |settings: &FilterSettings| {
-        let n = machine.robot.joints();
+        let n = setup.robot.joints();
         motions(&whole.t, &whole.q, &whole.tau, n, settings)
             .map_err(|e| IdentifyError::motion(&log.name(), e))
     };

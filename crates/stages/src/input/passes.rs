@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::control::{Control, ControlledWork};
 use super::error::IdentifyError;
 use super::log_data::LogData;
-use super::logged_robot::{LoggedRobot, narrowed};
 use super::own_settings::{JointCost, OwnSettings};
+use super::robot_setup::{RobotSetup, narrowed};
 use crate::note::StageNote;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::accumulate_weighted;
@@ -48,7 +48,7 @@ pub(crate) enum PositionFilter {
 
 /// Readings of the same logs, one after the other.
 pub struct LogPasses<'a> {
-    pub(crate) machine: &'a LoggedRobot,
+    pub(crate) setup: &'a RobotSetup,
     pub(crate) logs: &'a [LogData],
     pub(crate) control: &'a Control,
     pub(crate) work: ControlledWork,
@@ -71,9 +71,9 @@ pub struct LogPasses<'a> {
 }
 
 impl<'a> LogPasses<'a> {
-    pub fn new(machine: &'a LoggedRobot, logs: &'a [LogData], control: &'a Control) -> Self {
+    pub fn new(setup: &'a RobotSetup, logs: &'a [LogData], control: &'a Control) -> Self {
         LogPasses {
-            machine,
+            setup,
             logs,
             control,
             work: control.begin("least squares", None),
@@ -144,7 +144,7 @@ impl<'a> LogPasses<'a> {
 
     /// The processing of a log; a narrower filter is that of the log's own rate.
     fn settings(&self, filter: PositionFilter, log: usize) -> FilterSettings {
-        let mut declared = self.machine.settings();
+        let mut declared = self.setup.settings();
         declared.weighs_rests = !self.plain;
         if let Some(own) = self.own.get(log) {
             declared.joint_q_cutoffs_hz.clone_from(&own.cutoffs_hz);
@@ -208,7 +208,7 @@ impl<'a> LogPasses<'a> {
             }
             let mut open = log.open(self.control)?;
             let (sums, summary) = accumulate_weighted(
-                &self.machine.robot,
+                &self.setup.robot,
                 &columns,
                 weigher.as_deref_mut(),
                 &settings,
@@ -275,7 +275,7 @@ impl<'a> LogPasses<'a> {
                 }
                 Ok(more)
             };
-            let robot = &self.machine.robot;
+            let robot = &self.setup.robot;
             let columns = self.columns_of(columns, index);
             let read = instruments::accumulate(
                 robot,
@@ -310,7 +310,7 @@ impl<'a> LogPasses<'a> {
 
     /// Readings of a log with its positions read by the encoders once more: on so many shifted grids, or with their noise.
     pub(crate) fn readings_again(&self) -> u32 {
-        let known = self.machine.robot.transmission().encoder_steps();
+        let known = self.setup.robot.transmission().encoder_steps();
         known.map_or(NOISY, |_| GRIDS)
     }
 
@@ -347,7 +347,7 @@ impl<'a> LogPasses<'a> {
         let settings = self.settings(PositionFilter::Declared, index);
         let mut open = log.open(self.control)?;
         let read = accumulate_weighted(
-            &self.machine.robot,
+            &self.setup.robot,
             &columns,
             weigher,
             &settings,
@@ -369,7 +369,7 @@ impl<'a> LogPasses<'a> {
         grid: u32,
         mut weigher: Option<&mut RowWeigher>,
     ) -> Result<Option<BlockFactors>, IdentifyError> {
-        let unknown = self.machine.robot.transmission().encoder_steps().is_none();
+        let unknown = self.setup.robot.transmission().encoder_steps().is_none();
         if unknown && (0..self.logs.len()).all(|log| self.noise_that_tells(log).is_none()) {
             return Ok(None);
         }
@@ -388,7 +388,7 @@ impl<'a> LogPasses<'a> {
             }
             let mut open = log.open(self.control)?;
             let sums = accumulate_shifted(
-                &self.machine.robot,
+                &self.setup.robot,
                 &columns,
                 weigher.as_deref_mut(),
                 &settings,

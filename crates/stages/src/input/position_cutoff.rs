@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::control::Control;
 use super::error::IdentifyError;
 use super::log_data::LogData;
-use super::logged_robot::LoggedRobot;
 use super::own_settings::{CutoffCosts, JointCost, OwnSettings};
+use super::robot_setup::RobotSetup;
 use crate::note::{FitNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
@@ -74,12 +74,12 @@ impl CutoffCosts {
     /// Cut-offs of a fit of these logs, of several the lowest with the rms of the costs, and what is wrong with them.
     pub(crate) fn described(
         logs: &[&CutoffCosts],
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         columns: &RegressorColumns,
         fit: &Fit,
     ) -> (Vec<PositionCutoff>, Vec<StageNote>) {
         let (mut list, mut notes) = (Vec::new(), Vec::new());
-        for (j, joint) in machine.robot.joint_names().iter().enumerate() {
+        for (j, joint) in setup.robot.joint_names().iter().enumerate() {
             let costs = logs.iter().filter_map(|log| log.of_joint[j].as_ref());
             let costs: Vec<&JointCost> = costs.collect();
             let lowest = |of: fn(&JointCost) -> f64| {
@@ -105,7 +105,7 @@ impl CutoffCosts {
                 best_hz,
                 smear: mean(|c| c.at.smear),
                 noise: mean(|c| c.at.noise),
-                unit: machine.file.torque_unit(j).to_owned(),
+                unit: setup.file.torque_unit(j).to_owned(),
             };
             notes.extend(own.wrong(mean(|c| c.best.total()), fit.residual_std[j]));
             list.push(own);
@@ -157,14 +157,14 @@ pub(crate) fn known(model: &Model) -> Vec<Option<JointFriction>> {
     model.friction.iter().map(|law| Some(*law)).collect()
 }
 
-impl LoggedRobot {
+impl RobotSetup {
     /// The same robot with the position cut-offs that its logs call for; a law is none where it is not known.
     pub(crate) fn with_position_cutoffs(
         &self,
         logs: &[LogData],
         laws: &[Option<JointFriction>],
         control: &Control,
-    ) -> Result<LoggedRobot, IdentifyError> {
+    ) -> Result<RobotSetup, IdentifyError> {
         let speeds = self.rest_speeds(logs)?;
         self.with_cutoffs_along(logs, laws, &speeds, control)
     }
@@ -174,19 +174,18 @@ impl LoggedRobot {
         &self,
         logs: &[LogData],
         laws: &[Option<JointFriction>],
-        together: &LoggedRobot,
+        together: &RobotSetup,
         control: &Control,
     ) -> Result<Vec<FilterSettings>, IdentifyError> {
         let of_log = |log: &LogData| {
             let log = std::slice::from_ref(log);
-            let mut machine = self.clone();
+            let mut setup = self.clone();
             if self.finds_cutoffs() {
                 let speeds = self.rest_speeds(log)?;
                 let costs = self.cutoff_costs(log, laws, &speeds, control)?;
-                machine.position_cutoffs_hz =
-                    Arc::new(costs.found_or(&together.position_cutoffs_hz));
+                setup.position_cutoffs_hz = Arc::new(costs.found_or(&together.position_cutoffs_hz));
             }
-            Ok(machine.settings())
+            Ok(setup.settings())
         };
         logs.iter().map(of_log).collect()
     }
@@ -198,7 +197,7 @@ impl LoggedRobot {
         laws: &[Option<JointFriction>],
         rest_speed: &[f64],
         control: &Control,
-    ) -> Result<LoggedRobot, IdentifyError> {
+    ) -> Result<RobotSetup, IdentifyError> {
         if !self.finds_cutoffs() {
             return Ok(self.clone());
         }
@@ -240,12 +239,12 @@ impl LoggedRobot {
     }
 
     /// The same robot with the cut-offs that cost least.
-    fn with_cutoffs(&self, costs: &CutoffCosts) -> LoggedRobot {
-        let mut machine = self.clone();
+    fn with_cutoffs(&self, costs: &CutoffCosts) -> RobotSetup {
+        let mut setup = self.clone();
         if self.finds_cutoffs() {
-            machine.position_cutoffs_hz = Arc::new(costs.found());
+            setup.position_cutoffs_hz = Arc::new(costs.found());
         }
-        machine
+        setup
     }
 
     /// The same robot with the position cut-offs by which a model is validated on these logs, where none are declared.
@@ -257,13 +256,13 @@ impl LoggedRobot {
         logs: &[LogData],
         model: &AugmentedModel,
         control: &Control,
-    ) -> Result<LoggedRobot, IdentifyError> {
+    ) -> Result<RobotSetup, IdentifyError> {
         self.with_position_cutoffs(logs, &known(&model.model), control)
     }
 
     /// The same robot with the position cut-offs that a fit took, where it found them.
-    pub fn smoothed_as(&self, fit: &[PositionCutoff]) -> LoggedRobot {
-        let mut machine = self.clone();
+    pub fn smoothed_as(&self, fit: &[PositionCutoff]) -> RobotSetup {
+        let mut setup = self.clone();
         // where none was looked for, the plain one is as high as the sampling rate carries
         if self.finds_cutoffs() && !fit.is_empty() {
             let plain = self.settings().plain_q_cutoff_hz(f64::INFINITY);
@@ -271,22 +270,21 @@ impl LoggedRobot {
                 let own = fit.iter().find(|of| of.joint == *joint);
                 own.map_or(plain, |of| of.cutoff_hz)
             };
-            machine.position_cutoffs_hz =
-                Arc::new(self.robot.joint_names().iter().map(of).collect());
+            setup.position_cutoffs_hz = Arc::new(self.robot.joint_names().iter().map(of).collect());
         }
-        machine
+        setup
     }
 
     /// The same robot with the position cut-offs by which a model's band was found; none where they are its own.
-    pub(crate) fn as_held(&self, held: &[HeldOut]) -> Option<LoggedRobot> {
+    pub(crate) fn as_held(&self, held: &[HeldOut]) -> Option<RobotSetup> {
         if held.len() != self.position_cutoffs_hz.len() {
             return None;
         }
         let cutoffs: Vec<f64> = held.iter().map(|held| held.position_cutoff_hz).collect();
         (cutoffs != *self.position_cutoffs_hz).then(|| {
-            let mut machine = self.clone();
-            machine.position_cutoffs_hz = Arc::new(cutoffs);
-            machine
+            let mut setup = self.clone();
+            setup.position_cutoffs_hz = Arc::new(cutoffs);
+            setup
         })
     }
 

@@ -3,7 +3,7 @@
 use super::error::IdentifyError;
 use super::log::Log;
 use super::log_data::LogData;
-use super::logged_robot::LoggedRobot;
+use super::robot_setup::RobotSetup;
 use crate::note::{LogNote, StageNote};
 use cft_ident_logs::log::{Layout, Provenance, escape, sha256, shares_rows};
 
@@ -11,12 +11,12 @@ use cft_ident_logs::log::{Layout, Provenance, escape, sha256, shares_rows};
 pub(crate) type Role<'a> = (&'static str, &'a [LogData]);
 
 /// Refuses two logs with the same rows, within a role and between roles.
-pub(crate) fn each_row_once(machine: &LoggedRobot, roles: &[Role]) -> Result<(), IdentifyError> {
+pub(crate) fn each_row_once(setup: &RobotSetup, roles: &[Role]) -> Result<(), IdentifyError> {
     let all: Vec<(&str, Log)> = roles
         .iter()
         .flat_map(|(role, logs)| logs.iter().map(|log| (*role, log.source())))
         .collect();
-    let layout = machine.file.layout();
+    let layout = setup.file.layout();
     let logs: Vec<&Log> = all.iter().map(|(_, log)| log).collect();
     match pairs(&logs, Some(&layout)).next() {
         None => Ok(()),
@@ -31,11 +31,11 @@ pub(crate) fn each_row_once(machine: &LoggedRobot, roles: &[Role]) -> Result<(),
 
 /// Logs of the list that share no row with one of the others.
 pub(crate) fn without_rows_of(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     logs: &[LogData],
     others: &[LogData],
 ) -> Vec<LogData> {
-    let layout = machine.file.layout();
+    let layout = setup.file.layout();
     let fresh = |log: &&LogData| {
         !others
             .iter()

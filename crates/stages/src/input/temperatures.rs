@@ -3,7 +3,7 @@
 use super::error::IdentifyError;
 use super::log::Log;
 use super::log_data::LogData;
-use super::logged_robot::LoggedRobot;
+use super::robot_setup::RobotSetup;
 use crate::note::{LogNote, StageNote};
 use cft_ident_core::effect::{AugmentedModel, Law};
 use cft_ident_core::explain::{ErrorText, Explain};
@@ -60,7 +60,7 @@ pub(crate) fn none_on(stream: &str, model: &AugmentedModel) -> IdentifyError {
     }
 }
 
-impl LoggedRobot {
+impl RobotSetup {
     /// Puts the temperatures of a log beside its stretches; a column that it lacks is noted.
     pub(crate) fn put_temperatures(
         &self,

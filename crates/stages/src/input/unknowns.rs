@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::logged_robot::LoggedRobot;
+use super::robot_setup::RobotSetup;
 use cft_ident_core::inertia::columns::{JointTerm, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::essential::EssentialParameters;
 use cft_ident_core::inertia::solve::Fit;
@@ -70,13 +70,10 @@ impl FittedUnknown {
 }
 
 /// Which columns this robot's rows have.
-pub(crate) fn columns(
-    machine: &LoggedRobot,
-    friction: Option<&[KnownFriction]>,
-) -> RegressorColumns {
-    let robot = &machine.robot;
+pub(crate) fn columns(setup: &RobotSetup, friction: Option<&[KnownFriction]>) -> RegressorColumns {
+    let robot = &setup.robot;
     let n = robot.joints();
-    let section = &machine.file.friction;
+    let section = &setup.file.friction;
     let mut own = vec![Vec::new(); n];
     let mut known = vec![None; n];
     for j in 0..n {
@@ -99,12 +96,12 @@ pub(crate) fn columns(
 
 /// Every unknown, in the order of the columns.
 pub(crate) fn unknowns(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     columns: &RegressorColumns,
     fit: &Fit,
     essential: &EssentialParameters,
 ) -> Vec<FittedUnknown> {
-    let robot = &machine.robot;
+    let robot = &setup.robot;
     // of the unknown in column i
     let rated = |i: usize, key: &str, unit: String, meaning: &str| {
         let fitted = fit.theta[i];
@@ -134,7 +131,7 @@ pub(crate) fn unknowns(
     };
     let mut out = Vec::with_capacity(columns.unknowns());
     for (i, info) in robot.parameters().iter().enumerate() {
-        let unit = inertia_unit(robot, &info.unit, machine.file.inertial_torque_unit());
+        let unit = inertia_unit(robot, &info.unit, setup.file.inertial_torque_unit());
         let mut unknown = rated(i, &info.name, unit, &info.meaning);
         if i < robot.groupings().len() {
             unknown.name.clone_from(&unknown.meaning);
@@ -145,7 +142,7 @@ pub(crate) fn unknowns(
     for (j, joint) in robot.joint_names().iter().enumerate() {
         for own in &columns.own[j] {
             let name = own.name();
-            let unit = friction_unit(robot, j, name, machine.file.torque_unit(j));
+            let unit = friction_unit(robot, j, name, setup.file.torque_unit(j));
             let mut unknown = rated(out.len(), name, unit, friction_meaning(name));
             unknown.joint = Some(joint.clone());
             out.push(unknown);

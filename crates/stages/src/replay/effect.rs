@@ -59,7 +59,7 @@ fn rows(
     logs: &[usize],
 ) -> Result<(usize, Vec<[f64; 3]>), MotionError> {
     let effect = &model.effects[at];
-    let joints = replay.machine.robot.joints();
+    let joints = replay.setup.robot.joints();
     let mut all: Vec<Vec<[f64; 3]>> = vec![Vec::new(); joints];
     let wanted = |stretch: &&Stretch| logs.contains(&stretch.log);
     for stretch in replay.stretches.iter().filter(wanted) {
@@ -148,9 +148,9 @@ impl OfSignal {
     }
 
     fn named(self, replay: &LogReplay, effect: &ModelEffect, joint: usize) -> (String, String) {
-        let robot = &replay.machine.robot;
+        let robot = &replay.setup.robot;
         let unit = |j: usize| robot.joint_kind(j).position_unit();
-        let torque = replay.machine.file.torque_unit(joint);
+        let torque = replay.setup.file.torque_unit(joint);
         let force = if torque == "N" { "force" } else { "torque" };
         let (what, joint, unit) = match self {
             OfSignal::Wave(_) if effect.place.joint().is_some() => (

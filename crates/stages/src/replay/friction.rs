@@ -32,7 +32,7 @@ pub(super) fn friction(
     model: &AugmentedModel,
 ) -> Result<Vec<FrictionRows>, MotionError> {
     let mut rows = friction_rows(replay, model)?;
-    let joints = replay.machine.robot.joint_names().iter().enumerate();
+    let joints = replay.setup.robot.joint_names().iter().enumerate();
     let of_joint = |(j, joint): (usize, &String)| {
         let law = model.model.friction.get(j)?;
         let [low, high] = replay.velocities(j)?;

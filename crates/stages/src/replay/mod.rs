@@ -16,7 +16,7 @@ pub use torque::{JointSeries, TorqueSeries};
 use crate::find::diagnose::Diagnosed;
 use crate::held_out::compare::Compared;
 use crate::input::in_memory::InMemory;
-use crate::input::logged_robot::LoggedRobot;
+use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch};
 use cft_ident_files::config::ModelFile;
@@ -24,7 +24,7 @@ use cft_ident_logs::log::escape;
 
 /// Logs with the processing of a robot.
 pub struct LogReplay<'a> {
-    pub(crate) machine: &'a LoggedRobot,
+    pub(crate) setup: &'a RobotSetup,
     stretches: &'a [Stretch],
     /// Names of the logs, by the index that their stretches carry.
     names: Vec<String>,
@@ -38,14 +38,14 @@ impl<'a> LogReplay<'a> {
     /// # Errors
     /// Settings that the sampling rate does not carry.
     pub fn new(
-        machine: &'a LoggedRobot,
+        setup: &'a RobotSetup,
         in_memory: &'a InMemory,
         logs: impl Iterator<Item = String>,
     ) -> Result<Self, MotionError> {
-        let settings = machine.settings();
+        let settings = setup.settings();
         let filters = ParallelFilters::design(&settings, &in_memory.stretches)?;
         Ok(LogReplay {
-            machine,
+            setup,
             stretches: &in_memory.stretches,
             names: logs.map(|name| escape(&name)).collect(),
             filters,
@@ -141,11 +141,11 @@ impl ReplayedDiagnosis {
     /// # Errors
     /// Stretches that are too short for the filter; settings that the sampling rate does not carry.
     pub fn new(
-        machine: &LoggedRobot,
+        setup: &RobotSetup,
         found: &Diagnosed,
         refined: &ModelFile,
     ) -> Result<Self, MotionError> {
-        let replay = LogReplay::new(machine, &found.in_memory, found.logs.iter().cloned())?;
+        let replay = LogReplay::new(setup, &found.in_memory, found.logs.iter().cloned())?;
         let d = &found.diagnosis;
         let all = replay.all();
         let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));

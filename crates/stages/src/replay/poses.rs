@@ -26,7 +26,7 @@ pub struct TreePoses {
 
 /// Poses along some logs; none for a robot whose links are not known.
 pub(super) fn poses(replay: &LogReplay, logs: &[usize]) -> Option<TreePoses> {
-    let robot = &replay.machine.robot;
+    let robot = &replay.setup.robot;
     let tree = robot.tree();
     if !robot.knows_links() {
         return None;

@@ -33,7 +33,7 @@ pub(super) fn residual(
     after: Option<&AugmentedModel>,
 ) -> Result<ResidualEvidence, MotionError> {
     let found = after.unwrap_or(before);
-    let joints = 0..replay.machine.robot.joints();
+    let joints = 0..replay.setup.robot.joints();
     let waves: Vec<Vec<f64>> = joints.map(|j| orders(found, j)).collect();
     let reach = waves
         .iter()

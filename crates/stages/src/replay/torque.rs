@@ -70,7 +70,7 @@ struct Series {
 
 impl Series {
     fn new(replay: &LogReplay, models: usize) -> Self {
-        let joints = replay.machine.robot.joints();
+        let joints = replay.setup.robot.joints();
         Series {
             joints,
             t: Vec::new(),

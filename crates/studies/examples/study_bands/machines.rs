@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cft_ident::config::ModelFile;
 use cft_ident::identify::{
-    Control, Dataset, GivenModel, Log, LoggedRobot, LsqSettings, RowSource, ValidateSettings,
+    Control, Dataset, GivenModel, Log, LsqSettings, RobotSetup, RowSource, ValidateSettings,
     WatchSettings, lsq, validate, watch,
 };
 use cft_ident::log::LogSpec;
@@ -75,7 +75,7 @@ impl Machine {
             eprintln!("{}: no data, skipped", self.name);
             return None;
         }
-        let machine = LoggedRobot::load(self.robot).expect("a robot file");
+        let machine = RobotSetup::load(self.robot).expect("a robot file");
         let mut scored = Scored::new(machine.robot.joints());
         let control = Control::default();
         for rotation in 0..3 {
@@ -125,7 +125,7 @@ impl Scored {
 
     pub fn score(&mut self, model: &ModelFile, logs: &[Log]) {
         let given = GivenModel::new("model", model.clone());
-        let machine = given.machine();
+        let machine = given.setup();
         let control = Control::default();
         let (data, tried) = (
             Dataset::read(&machine, logs, &Control::default()).expect("logs that can be read"),

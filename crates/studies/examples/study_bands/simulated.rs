@@ -1,7 +1,7 @@
 //! The simulated CFT robot: a model of twenty minutes, and minutes that it did not see.
 
 use cft_ident::config::{ModelFile, RobotFile};
-use cft_ident::identify::{Control, Dataset, Log, LoggedRobot, LsqSettings, lsq};
+use cft_ident::identify::{Control, Dataset, Log, LsqSettings, RobotSetup, lsq};
 use cft_ident::motion::ZeroOrderHold;
 use cft_ident::robot::cft::LaboratorySetup;
 use cft_ident::simulate::CftTruth;
@@ -16,12 +16,12 @@ use super::study::{along, block, noisy, series};
 const FITTED: u64 = 20;
 
 pub struct Campaign {
-    machine: LoggedRobot,
+    machine: RobotSetup,
     model: ModelFile,
 }
 
 /// A minute of the campaign's motion at phases of its own.
-fn minute(machine: &LoggedRobot, seed: u64) -> Log {
+fn minute(machine: &RobotSetup, seed: u64) -> Log {
     let motion = series("configs/cft-excitation.toml").at_random_phase(seed);
     let truth = CftTruth::synthetic(LaboratorySetup::Tuedacs);
     let run = follow(&truth, &[], along(motion), &noisy(60.0, seed)).expect("a run");
@@ -34,7 +34,7 @@ impl Campaign {
     pub fn new() -> Self {
         let mut file = RobotFile::load("configs/cft.toml".as_ref()).expect("a robot file");
         file.friction.fitted_with_inertias = true;
-        let machine = LoggedRobot::new("configs/cft.toml", file);
+        let machine = RobotSetup::new("configs/cft.toml", file);
         let logs: Vec<Log> = (0..FITTED)
             .into_par_iter()
             .map(|seed| minute(&machine, 1_000_000 + seed))

@@ -6,7 +6,7 @@ use crate::report::figure::EffectFigure;
 use crate::report::words::{scaled, torque_or_force};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::number;
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 use cft_ident_stages::replay::EffectRows;
 
 /// Part of the residual's rms that an effect takes away at least, where its card is not folded.
@@ -15,14 +15,14 @@ const GAIN: f64 = 0.01;
 /// The card of an effect with its sentences; folded away where `no_gain` says why, or where `data` gain little by it.
 pub fn card(
     page: &mut Writer,
-    (machine, model): (&LoggedRobot, &AugmentedModel),
+    (setup, model): (&RobotSetup, &AugmentedModel),
     of: &EffectRows,
     (title, said, no_gain): (String, Vec<String>, Option<String>),
     data: &str,
 ) {
     let effect = &model.effects[of.effect];
-    let joint = &machine.robot.joint_names()[of.joint];
-    let unit = machine.file.torque_unit(of.joint);
+    let joint = &setup.robot.joint_names()[of.joint];
+    let unit = setup.file.torque_unit(of.joint);
     let [rms_without, rms_with] = of.rms;
     let shown = |rms| format!("{} {unit}", number::significant(rms, 3));
     let [without, with] = of.rms.map(shown);

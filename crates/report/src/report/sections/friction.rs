@@ -3,20 +3,20 @@
 use crate::report::Writer;
 use crate::report::figure::{FrictionFigure, FrictionPanel};
 use crate::report::words::first_of;
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 use cft_ident_stages::replay::FrictionRows;
 
 /// The section; none for a model without friction.
-pub fn section(page: &mut Writer, machine: &LoggedRobot, of: &[FrictionRows], logs: &[String]) {
+pub fn section(page: &mut Writer, setup: &RobotSetup, of: &[FrictionRows], logs: &[String]) {
     if of.is_empty() {
         return;
     }
     let panel = |of: &FrictionRows| {
-        let unit = machine.robot.joint_kind(of.joint).position_unit();
+        let unit = setup.robot.joint_kind(of.joint).position_unit();
         FrictionPanel {
-            joint: machine.robot.joint_names()[of.joint].clone(),
+            joint: setup.robot.joint_names()[of.joint].clone(),
             speed_unit: format!("{unit}/s"),
-            torque_unit: machine.file.torque_unit(of.joint).to_owned(),
+            torque_unit: setup.file.torque_unit(of.joint).to_owned(),
             curve: of.curve.clone(),
             covered: vec![of.covered],
             cloud: of.rows.clone(),

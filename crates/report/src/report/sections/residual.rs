@@ -5,22 +5,22 @@ use crate::report::figure::{ResidualFigure, ResidualLine, ResidualPanel};
 use crate::report::words::{first_of, torque_or_force};
 use cft_ident_core::diagnose::JointEvidence;
 use cft_ident_core::number;
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 use cft_ident_stages::replay::{ResidualEvidence, ResidualPair};
 
 /// The figure.
-pub fn figure(machine: &LoggedRobot, of: &ResidualEvidence) -> ResidualFigure {
+pub fn figure(setup: &RobotSetup, of: &ResidualEvidence) -> ResidualFigure {
     let after = of.joints.iter().any(|joint| joint.after.is_some());
     let what = match after {
         true => "Residual before and after",
         false => "Residual",
     };
-    let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    let joints = setup.robot.joint_names().iter().zip(&of.joints);
     let begins = of.begins.iter();
     let begins = begins.map(|(at, log)| (*at, log.trim_end_matches(".csv").to_owned()));
     let begins: Vec<(f64, String)> = begins.collect();
     let panels = |(j, (name, of)): (usize, (&String, &ResidualPair))| {
-        (name.clone(), panels(machine, j, of, &begins))
+        (name.clone(), panels(setup, j, of, &begins))
     };
     ResidualFigure {
         title: format!("{what}: {}", first_of(&of.logs)),
@@ -35,13 +35,13 @@ fn short(order: f64) -> String {
 }
 
 fn panels(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     j: usize,
     of: &ResidualPair,
     begins: &[(f64, String)],
 ) -> Vec<ResidualPanel> {
-    let torque = machine.file.torque_unit(j);
-    let position = machine.robot.joint_kind(j).position_unit();
+    let torque = setup.file.torque_unit(j);
+    let position = setup.robot.joint_kind(j).position_unit();
     let speed = format!("{position}/s");
     let wave = if position == "m" { "1/m" } else { "1/rev" };
     let load = format!("load {}", torque_or_force(torque));
@@ -110,14 +110,14 @@ fn panels(
 }
 
 /// The section.
-pub(crate) fn section(page: &mut Writer, machine: &LoggedRobot, of: &ResidualEvidence) {
+pub(crate) fn section(page: &mut Writer, setup: &RobotSetup, of: &ResidualEvidence) {
     page.heading("The residual and its spectra");
     page.paragraph(
         "Means over bins of the filtered residual, forward and backward apart; amplitudes of its \
          waves over position (order) and over time (frequency). Waves that were found are marked. A residual without \
          pattern is noise.",
     );
-    for cells in figure(machine, of).cells() {
+    for cells in figure(setup, of).cells() {
         page.figures(cells);
     }
 }

@@ -3,18 +3,18 @@
 use crate::report::Writer;
 use crate::report::figure::{PoseSketch, SketchJoint};
 use crate::report::words::first_of;
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 use cft_ident_stages::replay::TreePoses;
 
 /// The section, with relative errors by joint; nothing without poses.
 pub fn section(
     page: &mut Writer,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     of: Option<&TreePoses>,
     errors: impl Iterator<Item = f64>,
 ) {
     let Some(of) = of else { return };
-    let joints = machine.robot.joint_names().iter().zip(&of.driven);
+    let joints = setup.robot.joint_names().iter().zip(&of.driven);
     let errors = errors.chain(std::iter::repeat(f64::NAN));
     let sketch = PoseSketch {
         title: format!("Joints by their error along {}", first_of(&of.logs)),

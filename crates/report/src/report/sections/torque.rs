@@ -7,7 +7,7 @@ use crate::report::figure::{JointTorque, TorqueFigure, parted};
 use crate::report::traces::{FigureTraces, LogTrace, TraceLine, TracePanel, TraceStyle};
 use crate::report::words::torque_or_force;
 use cft_ident_core::number;
-use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::identify::RobotSetup;
 use cft_ident_stages::replay::{JointSeries, TorqueSeries};
 
 /// How the torque of a model is drawn.
@@ -28,7 +28,7 @@ pub const ONLY: TorqueDrawing = TorqueDrawing {
 };
 
 /// Torques of logs by models that are drawn so.
-fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[TorqueDrawing]) -> FigureTraces {
+fn traces(setup: &RobotSetup, of: &[TorqueSeries], models: &[TorqueDrawing]) -> FigureTraces {
     // each log in two forms
     let several = of.len() > 2;
     let traces = of.iter().map(|series| {
@@ -43,7 +43,7 @@ fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[TorqueDrawing]) 
             true => format!("{}: {what}", series.log),
             false => what,
         };
-        trace(machine, series, models, name)
+        trace(setup, series, models, name)
     });
     FigureTraces {
         label: "Measured and reconstructed torque over time".into(),
@@ -52,15 +52,15 @@ fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[TorqueDrawing]) 
 }
 
 fn trace(
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     of: &TorqueSeries,
     models: &[TorqueDrawing],
     name: String,
 ) -> LogTrace {
     let mut panels = Vec::new();
-    let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    let joints = setup.robot.joint_names().iter().zip(&of.joints);
     for (j, (joint, series)) in joints.enumerate() {
-        let unit = machine.file.torque_unit(j).to_owned();
+        let unit = setup.file.torque_unit(j).to_owned();
         let line = |name: &str, style, values| TraceLine {
             name: name.to_owned(),
             style,
@@ -97,12 +97,12 @@ fn trace(
 }
 
 /// The still picture of a log, by the last of its models.
-fn still(machine: &LoggedRobot, of: &TorqueSeries, title: &str) -> TorqueFigure {
+fn still(setup: &RobotSetup, of: &TorqueSeries, title: &str) -> TorqueFigure {
     let whole = |values: &[f64]| parted(values.iter().copied(), &of.breaks);
     let joint = |(j, (name, series)): (usize, (&String, &JointSeries))| {
         Some(JointTorque {
             joint: name.clone(),
-            unit: machine.file.torque_unit(j).to_owned(),
+            unit: setup.file.torque_unit(j).to_owned(),
             t: whole(&of.t),
             measured: whole(&series.measured),
             reconstructed: whole(series.reconstructed.last()?),
@@ -110,7 +110,7 @@ fn still(machine: &LoggedRobot, of: &TorqueSeries, title: &str) -> TorqueFigure 
             rmse: series.rmse,
         })
     };
-    let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    let joints = setup.robot.joint_names().iter().zip(&of.joints);
     TorqueFigure {
         title: title.to_owned(),
         joints: joints.enumerate().filter_map(joint).collect(),
@@ -120,7 +120,7 @@ fn still(machine: &LoggedRobot, of: &TorqueSeries, title: &str) -> TorqueFigure 
 /// The section.
 pub fn section(
     page: &mut Writer,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     of: &[TorqueSeries],
     models: &[TorqueDrawing],
     title: &str,
@@ -136,7 +136,7 @@ pub fn section(
             [.., last] if models.len() > 1 => format!("{title}: {}", last.names[0]),
             _ => title,
         };
-        still(machine, first, &title).by_joint()
+        still(setup, first, &title).by_joint()
     });
-    page.traces(&traces(machine, of, models), figure);
+    page.traces(&traces(setup, of, models), figure);
 }

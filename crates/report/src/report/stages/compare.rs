@@ -86,7 +86,7 @@ pub fn pictures(
         };
         let models = [drawn(a, TraceStyle::Before), drawn(b, TraceStyle::After)];
         let title = replayed.logs.join(", ");
-        torque::section(page, &of.machine, &replayed.torque, &models, &title);
+        torque::section(page, &of.setup, &replayed.torque, &models, &title);
         quality::section(page, quality, &NO_WARNINGS);
     }
     let summary = of.tried.as_ref().map(|tried| &tried.in_memory.summary);
@@ -95,13 +95,13 @@ pub fn pictures(
         .map(|side| &*side.given.file.provenance.inputs)
         .concat();
     made_from.dedup();
-    provenance::section(page, &of.machine.file, read, &made_from, summary, command);
+    provenance::section(page, &of.setup.file, read, &made_from, summary, command);
 }
 
 /// Friction of both over each other: a curve over velocity, or along the logs where effects make it depend on
 /// more; of such a model without logs the declared law alone.
 pub fn figure(of: &Compared, replayed: Option<&ReplayedPair>) -> OverlayFigure {
-    let names = of.machine.robot.joint_names();
+    let names = of.setup.robot.joint_names();
     let panel = |shown: &FrictionCurves| {
         let speeds: Vec<f64> = speeds(shown.most).collect();
         let mut curves = of.at(shown, speeds.into_iter());
@@ -200,7 +200,7 @@ fn bars(of: &Compared, tried: &TriedOnLogs, names: &[String; 2]) -> ErrorFigure 
         names: names.clone(),
         joints: joints.collect(),
         limit: None,
-        usual: Some(usual::drawn(of.machine.file.log.torque_is)),
+        usual: Some(usual::drawn(of.setup.file.log.torque_is)),
     }
 }
 

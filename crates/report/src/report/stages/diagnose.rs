@@ -16,7 +16,7 @@ use cft_ident_core::diagnose::{Diagnosis, FoundEffect, LeftCandidate, SplitError
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::identify::{DataFault, Diagnosed, LoggedRobot};
+use cft_ident_stages::identify::{DataFault, Diagnosed, RobotSetup};
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
 /// Candidates that a page shows.
@@ -28,7 +28,7 @@ const MARGIN: &str = "     ";
 
 /// The parts of the report.
 pub struct DiagnoseReport<'a> {
-    pub machine: &'a LoggedRobot,
+    pub setup: &'a RobotSetup,
     pub file: &'a ModelFile,
     /// The model file.
     pub given: &'a Provenance,
@@ -43,13 +43,13 @@ pub struct DiagnoseReport<'a> {
 /// The effects, their numbers, the residual that is left, and the errors before and after.
 pub fn diagnose(of: &DiagnoseReport) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
-    words(of.machine, of.found).write(&mut report.everywhere());
+    words(of.setup, of.found).write(&mut report.everywhere());
     let typed = (of.refined, of.path, of.logs);
-    diagnosed(&mut report, (of.machine, of.found), typed);
+    diagnosed(&mut report, (of.setup, of.found), typed);
     let mut page = report.page();
-    first_screen::show(&mut page, of.machine, of.found);
-    errors(&mut page, of.machine, of.found);
-    formulas::write(&mut page, of.machine, of.found);
+    first_screen::show(&mut page, of.setup, of.found);
+    errors(&mut page, of.setup, of.found);
+    formulas::write(&mut page, of.setup, of.found);
     free_run::section(&mut page, of.found.free_run.as_ref());
     report
 }
@@ -62,18 +62,18 @@ pub fn pictures(
     quality: &[InspectedLog],
     command: &str,
 ) {
-    let (machine, found) = (of.machine, of.found);
-    sections(page, machine, found, replayed);
+    let (setup, found) = (of.setup, of.found);
+    sections(page, setup, found, replayed);
     parameters::section(page, of.refined, &|_| None);
     let logs: Vec<String> = found.logs.iter().map(|name| escape(name)).collect();
-    friction::section(page, machine, &replayed.friction, &logs);
+    friction::section(page, setup, &replayed.friction, &logs);
     page.heading("Correlated parameters");
     fit::pairs(page, of.refined);
     quality::section(page, quality, &found.in_memory.notes);
     let mut inputs = vec![of.given.clone()];
     inputs.extend(found.in_memory.inputs.iter().cloned());
     let (summary, made_from) = (Some(&found.in_memory.summary), &of.file.provenance.inputs);
-    provenance::section(page, &machine.file, &inputs, made_from, summary, command);
+    provenance::section(page, &setup.file, &inputs, made_from, summary, command);
 }
 
 /// Where the data are at fault, which comes before any physics.
@@ -96,38 +96,38 @@ pub fn at_fault(fault: &DataFault) -> String {
 /// The errors and the next step for a terminal; the effects one by one where it shows everything.
 pub(super) fn diagnosed(
     report: &mut Report,
-    (machine, found): (&LoggedRobot, &Diagnosed),
+    (setup, found): (&RobotSetup, &Diagnosed),
     (file, path, logs): (&ModelFile, &str, &str),
 ) {
     let d = &found.diagnosis;
-    first_screen::write_next(report, (machine, found), (file, path, logs));
+    first_screen::write_next(report, (setup, found), (file, path, logs));
     report.terminal().line("");
-    in_short(&mut report.usual(), machine, d);
+    in_short(&mut report.usual(), setup, d);
     report
         .terminal()
-        .list(d.steps.iter().filter_map(|step| seen(machine, step)));
+        .list(d.steps.iter().filter_map(|step| seen(setup, step)));
     let mut detail = report.detail();
-    detail.table(before_and_after(machine, d));
+    detail.table(before_and_after(setup, d));
     if !d.steps.is_empty() {
         detail.line("");
     }
     for (i, step) in d.steps.iter().enumerate() {
-        numbered(&mut detail, machine, (i + 1, step));
+        numbered(&mut detail, setup, (i + 1, step));
     }
     free_run::section(&mut detail, found.free_run.as_ref());
-    detail.list(doubts(machine, found));
-    let changes = changes(machine, found);
+    detail.list(doubts(setup, found));
+    let changes = changes(setup, found);
     let (on_screen, more) = changes.split_at(changes.len().min(MAX_CHANGES_ON_SCREEN));
     report.terminal().list(on_screen);
     report.detail().list(more);
-    formulas::in_short(&mut report.usual(), machine, found);
-    formulas::write(&mut report.detail(), machine, found);
-    formulas::candidates(&mut report.detail(), machine, found);
+    formulas::in_short(&mut report.usual(), setup, found);
+    formulas::write(&mut report.detail(), setup, found);
+    formulas::candidates(&mut report.detail(), setup, found);
     first_screen::narrowing(&mut report.detail(), file, path);
 }
 
 /// Errors joint by joint, those of a screen.
-fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
+fn in_short(usual: &mut Writer, setup: &RobotSetup, d: &Diagnosis) {
     let (_, before) = errors_of(&d.before);
     let (data, after) = errors_of(d.errors_now());
     let changed = d.written().next().is_some();
@@ -136,7 +136,7 @@ fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
     let (joints, more) = summary::most_wrong(&relative);
     let caption = format!("relative torque error [%] of each joint while it moves, {data}");
     let columns = Columns::new(&caption, joints)
-        .words("joint", |j| &machine.robot.joint_names()[j])
+        .words("joint", |j| &setup.robot.joint_names()[j])
         .when(changed, |t| {
             t.numbers("before", |j| hundred(before.joints[j].headline()))
         })
@@ -163,15 +163,15 @@ fn in_short(usual: &mut Writer, machine: &LoggedRobot, d: &Diagnosis) {
 }
 
 /// Friction that changes from a time on.
-fn changes(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
+fn changes(setup: &RobotSetup, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
     let shown = d.changes.iter().map(|c| {
         format!(
             "friction of {} changes by {} {} from {:.2} s of {} on ({} standard errors): a change in time, and no law \
              of the motion",
-            machine.robot.joint_names()[c.joint],
+            setup.robot.joint_names()[c.joint],
             number::significant(c.by, 2),
-            machine.file.torque_unit(c.joint),
+            setup.file.torque_unit(c.joint),
             c.at_s,
             found.logs[c.log],
             number::significant(c.certainty, 2)
@@ -181,13 +181,13 @@ fn changes(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
 }
 
 /// One effect that was found, for a terminal.
-fn numbered(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usize, &FoundEffect)) {
+fn numbered(terminal: &mut Writer, setup: &RobotSetup, (number, step): (usize, &FoundEffect)) {
     let effect = &step.estimate;
     let name = format!(
         "{} ({}): {}",
-        effect.title(&machine.robot),
+        effect.title(&setup.robot),
         effect.family().name(),
-        in_words(machine, step)
+        in_words(setup, step)
     );
     terminal.note(&format!("{number:>3}. "), &name, 7);
     let gain = format!(
@@ -203,18 +203,18 @@ fn numbered(terminal: &mut Writer, machine: &LoggedRobot, (number, step): (usize
     let sure = format!(
         "{}: torque {} (rms, 95 % CI), {}",
         grade(step),
-        torque(machine, step),
+        torque(setup, step),
         certainty(step)
     );
     let lines = [sure, gain];
-    let more = unseen.into_iter().chain(alternatives(machine, step));
+    let more = unseen.into_iter().chain(alternatives(setup, step));
     for line in lines.into_iter().chain(more) {
         terminal.note(MARGIN, &line, 7);
     }
 }
 
 /// Relative errors joint by joint.
-fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
+fn before_and_after(setup: &RobotSetup, d: &Diagnosis) -> Table {
     let caption = "relative torque error [%] of moving rows on fitted and held-out data, before and after; above noise: residual power beyond \
          the noise, over the torque's [%]";
     let hundred = number::hundredths;
@@ -223,7 +223,7 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
         Some(errors) => hundred(errors.joints[j].headline()),
         None => number::ABSENT.to_owned(),
     };
-    let (names, now) = (machine.robot.joint_names(), d.errors_now());
+    let (names, now) = (setup.robot.joint_names(), d.errors_now());
     Columns::new(caption, 0..names.len())
         .words("joint", |j| &names[j])
         .numbers("fitted", |j| fitted(&d.before, j))
@@ -239,7 +239,7 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
 }
 
 /// Why the effects found are an approximation; nothing where only noise is left.
-fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
+fn doubts(setup: &RobotSetup, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
     let open = d.structured_joints().map(|j| {
         let times = match d.left.unexplained[j].over_floor {
@@ -249,7 +249,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
             Some(_) => " (more than 100 times the noise)".to_owned(),
             None => String::new(),
         };
-        format!("{}{times}", machine.robot.joint_names()[j])
+        format!("{}{times}", setup.robot.joint_names()[j])
     });
     let open = listed(open);
     let mut out = Vec::new();
@@ -265,7 +265,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
              one that no known effect describes"
         ));
     }
-    out.extend(what_is_left::sentences(machine, found));
+    out.extend(what_is_left::sentences(setup, found));
     out
 }
 
@@ -283,7 +283,7 @@ fn explained(d: &Diagnosis) -> Option<f64> {
 /// The effects that were added, the torque and the residual before and after, and the effects that were not added.
 pub(super) fn sections(
     page: &mut Writer,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     found: &Diagnosed,
     replayed: &ReplayedDiagnosis,
 ) {
@@ -291,13 +291,13 @@ pub(super) fn sections(
     if !d.steps.is_empty() {
         page.heading("What the model lacks");
     }
-    page.list(doubts(machine, found));
-    found_effects::show(page, machine, found, replayed);
-    page.list(d.steps.iter().filter_map(|step| seen(machine, step)));
-    page.list(changes(machine, found));
+    page.list(doubts(setup, found));
+    found_effects::show(page, setup, found, replayed);
+    page.list(d.steps.iter().filter_map(|step| seen(setup, step)));
+    page.list(changes(setup, found));
     let errors = errors_of(d.errors_now()).1.joints.iter();
     let errors = errors.map(|e| e.headline());
-    sketch::section(page, machine, replayed.poses.as_ref(), errors);
+    sketch::section(page, setup, replayed.poses.as_ref(), errors);
     let drawn = |name: &'static str, styles| TorqueDrawing {
         names: [name.into(), format!("residual {name}").into()],
         styles,
@@ -309,13 +309,13 @@ pub(super) fn sections(
         Some(_) => vec![before, after],
     };
     let title = replayed.logs.join(", ");
-    torque::section(page, machine, &replayed.torque, &models, &title);
-    what_is_left::section(page, machine, found);
-    residual::section(page, machine, &replayed.residual);
-    candidates(page, machine, found);
+    torque::section(page, setup, &replayed.torque, &models, &title);
+    what_is_left::section(page, setup, found);
+    residual::section(page, setup, &replayed.residual);
+    candidates(page, setup, found);
 }
 
-fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+fn candidates(page: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
     let all = found.diagnosis.candidates.iter();
     let mut rest: Vec<(&LeftCandidate, f64)> = all.filter_map(|c| Some((c, c.score?))).collect();
     rest.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -325,7 +325,7 @@ fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     }
     page.heading("Candidates that were not chosen");
     let name = |c: &LeftCandidate| match &c.effect {
-        Some(effect) => effect.title(&machine.robot),
+        Some(effect) => effect.title(&setup.robot),
         None => c.law.entry.name.to_owned(),
     };
     let family = |c: &LeftCandidate| match &c.effect {
@@ -341,14 +341,14 @@ fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
 }
 
 /// Errors of every joint on fitted and held-out logs; before and after where another model is written.
-pub(super) fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+pub(super) fn errors(page: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
     let d = &found.diagnosis;
     let now = d.errors_now();
     let sides: Vec<(&str, &SplitErrors)> = match d.written().next() {
         Some(_) => vec![(", before", &d.before), (", after", now)],
         None => vec![("", now)],
     };
-    let names = machine.robot.joint_names();
+    let names = setup.robot.joint_names();
     let percent = |e: &UseErrors, j: usize| number::percent(e.joints[j].headline());
     let mut columns =
         Columns::new("relative torque error", 0..names.len()).words("joint", |j| &names[j]);
@@ -368,7 +368,7 @@ pub(super) fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed
     let columns = columns
         .words("rms", |j| {
             let rms = number::significant(counted.joints[j].rmse, 3);
-            format!("{rms} {}", machine.file.torque_unit(j))
+            format!("{rms} {}", setup.file.torque_unit(j))
         })
         .percent("residual with a pattern, of torque power", |j| {
             d.left.unexplained[j].share

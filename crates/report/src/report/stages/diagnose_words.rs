@@ -7,7 +7,7 @@ use crate::report::words::listed;
 use crate::report::{FigureTone, FoundLine, VerdictFigure, VerdictHeadline, Writer};
 use cft_ident_core::diagnose::{Diagnosis, FoundEffect, SplitErrors, StepStatus, UseErrors};
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, LoggedRobot, signal_words};
+use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, RobotSetup, signal_words};
 use cft_ident_stages::open_loop::JointFreeRun;
 
 /// Effects that the verdict names; it counts the others.
@@ -27,10 +27,10 @@ impl DiagnosisWords {
 }
 
 /// The verdict in figures and words.
-pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> DiagnosisWords {
+pub(super) fn words(setup: &RobotSetup, found: &Diagnosed) -> DiagnosisWords {
     let d = &found.diagnosis;
     let lacking = found.verdict();
-    let mut all = added(machine, d);
+    let mut all = added(setup, d);
     let said = |grade, text: String| FoundLine { grade, text };
     match lacking {
         DiagnosisVerdict::EffectsFound => {}
@@ -59,8 +59,8 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> DiagnosisWords 
                 .to_owned(),
         )),
     }
-    all.extend(taken_out(machine, d));
-    all.extend(most_is_left(machine, d).map(|text| said("remaining", text)));
+    all.extend(taken_out(setup, d));
+    all.extend(most_is_left(setup, d).map(|text| said("remaining", text)));
     let worse = runs_worse(found);
     if !worse.is_empty() {
         let text = format!(
@@ -70,18 +70,18 @@ pub(super) fn words(machine: &LoggedRobot, found: &Diagnosed) -> DiagnosisWords 
         all.push(said("worse", text));
     }
     DiagnosisWords {
-        headline: headline(machine, d),
+        headline: headline(setup, d),
         found: all,
     }
 }
 
 /// Error before, error after and what is usual.
-fn headline(machine: &LoggedRobot, d: &Diagnosis) -> VerdictHeadline {
+fn headline(setup: &RobotSetup, d: &Diagnosis) -> VerdictHeadline {
     let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
     let mean = |e: &UseErrors| e.overall.mean_relative_error_moving;
     let [from, to] = [before, after].map(|e| number::percent(mean(e)));
     let changed = d.written().next().is_some();
-    let torque_is = machine.file.log.torque_is;
+    let torque_is = setup.file.log.torque_is;
     let unusual = mean(after) > usual::band(torque_is)[1];
     let tone = match changed {
         true if mean(after) > mean(before) && from != to => FigureTone::Worse,
@@ -129,14 +129,14 @@ pub(super) fn is_exact(d: &Diagnosis) -> bool {
 }
 
 /// The effects, by how firm they are, and what of them is written.
-fn added(machine: &LoggedRobot, d: &Diagnosis) -> Vec<FoundLine> {
+fn added(setup: &RobotSetup, d: &Diagnosis) -> Vec<FoundLine> {
     let graded = |grade: &'static str, what: &str, steps: Vec<&FoundEffect>| {
         let mut all: Vec<FoundLine> = steps
             .iter()
             .take(NAMED)
             .map(|s| FoundLine {
                 grade,
-                text: titled(machine, &s.estimate) + what,
+                text: titled(setup, &s.estimate) + what,
             })
             .collect();
         if steps.len() > NAMED {
@@ -169,10 +169,10 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &UseErrors) {
 }
 
 /// The effects that held-out data took out of the model.
-fn taken_out(machine: &LoggedRobot, d: &Diagnosis) -> Option<FoundLine> {
+fn taken_out(setup: &RobotSetup, d: &Diagnosis) -> Option<FoundLine> {
     d.selected.as_ref()?;
     let vetoed = d.steps.iter().filter(|s| s.vetoed());
-    let names: Vec<String> = vetoed.map(|s| titled(machine, &s.estimate)).collect();
+    let names: Vec<String> = vetoed.map(|s| titled(setup, &s.estimate)).collect();
     let error = |of: &SplitErrors| number::percent(errors(of).1.overall.mean_relative_error_moving);
     let of = match d.written().next() {
         None => format!(" ({})", error(&d.after)),
@@ -194,8 +194,8 @@ pub(super) fn worst(d: &Diagnosis) -> Option<usize> {
 }
 
 /// The joint with the largest share of its torque left beyond the noise, and the signals on which that depends.
-fn most_is_left(machine: &LoggedRobot, d: &Diagnosis) -> Option<String> {
-    let names = machine.robot.joint_names();
+fn most_is_left(setup: &RobotSetup, d: &Diagnosis) -> Option<String> {
+    let names = setup.robot.joint_names();
     let worst = worst(d)?;
     let error = number::percent(errors(d.errors_now()).1.joints[worst].headline());
     let place = match names.len() {

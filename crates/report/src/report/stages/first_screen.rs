@@ -6,20 +6,20 @@ use crate::report::{Report, Writer, usual};
 use cft_ident_core::diagnose::{FoundEffect, UseErrors};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
-use cft_ident_stages::identify::{Diagnosed, LoggedRobot, narrowing_command, separating_command};
+use cft_ident_stages::identify::{Diagnosed, RobotSetup, narrowing_command, separating_command};
 
 /// Errors per joint as bars.
-pub(super) fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
-    page.figure(bars(machine, found).svg());
+pub(super) fn show(page: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
+    page.figure(bars(setup, found).svg());
 }
 
 /// The next step, for a terminal and for a page.
 pub(super) fn write_next(
     report: &mut Report,
-    (machine, found): (&LoggedRobot, &Diagnosed),
+    (setup, found): (&RobotSetup, &Diagnosed),
     (file, path, logs): (&ModelFile, &str, &str),
 ) {
-    let of = (machine, found);
+    let of = (setup, found);
     let (text, command) = next(of, file, (path, logs));
     report.terminal().next(&text, command);
     let (text, command) = next(of, file, (&*local(path), &*local(logs)));
@@ -36,7 +36,7 @@ pub(super) fn local(words: &str) -> String {
 }
 
 /// Errors of every joint before and after: held-out ones where there are any.
-fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
+fn bars(setup: &RobotSetup, found: &Diagnosed) -> ErrorFigure {
     let d = &found.diagnosis;
     let data = match d.after.holdout {
         Some(_) => "held-out data",
@@ -47,7 +47,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
         error: errors.joints[j].headline(),
         interval_95: Some(errors.joints[j].interval_95),
     };
-    let joints = machine.robot.joint_names().iter().enumerate();
+    let joints = setup.robot.joint_names().iter().enumerate();
     let joints = joints.map(|(j, joint)| JointBars {
         joint: joint.clone(),
         before: d.written().next().map(|_| bar(errors[0], j)),
@@ -58,7 +58,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
         names: ["before", "after"].map(str::to_owned),
         joints: joints.collect(),
         limit: None,
-        usual: (!is_exact(d)).then(|| usual::drawn(machine.file.log.torque_is)),
+        usual: (!is_exact(d)).then(|| usual::drawn(setup.file.log.torque_is)),
     }
 }
 
@@ -81,7 +81,7 @@ pub(super) fn narrowing(writer: &mut Writer, file: &ModelFile, path: &str) {
 /// The next step, and the command for it where there is one; the paths of the model and of the logs are those that a
 /// shell takes.
 fn next(
-    (machine, found): (&LoggedRobot, &Diagnosed),
+    (setup, found): (&RobotSetup, &Diagnosed),
     file: &ModelFile,
     (path, logs): (&str, &str),
 ) -> (String, Option<String>) {
@@ -110,13 +110,13 @@ fn next(
         let like = &step.alternatives[0];
         let (name, other) = match effect.place == like.place {
             // the joint is said once
-            true => (effect.name().to_owned(), like.title(&machine.robot)),
-            false => (effect.title(&machine.robot), like.title(&machine.robot)),
+            true => (effect.name().to_owned(), like.title(&setup.robot)),
+            false => (effect.title(&setup.robot), like.title(&setup.robot)),
         };
         // limits of the motion are the positions and speeds of the logs
         let command = match file.held_out.is_empty() {
             true => None,
-            false => separating_command(effect, &machine.robot, path),
+            false => separating_command(effect, &setup.robot, path),
         };
         return match command {
             Some(command) => (
@@ -129,7 +129,7 @@ fn next(
             )),
         };
     }
-    match worst(d).map(|j| &machine.robot.joint_names()[j]) {
+    match worst(d).map(|j| &setup.robot.joint_names()[j]) {
         Some(joint) if !found.searched => (
             format!("Next: search a formula for the residual of {joint}:"),
             Some(format!("cft-ident diagnose {logs} -m {path} --search")),

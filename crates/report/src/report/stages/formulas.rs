@@ -6,17 +6,17 @@ use crate::report::figure::{EffectFigure, PictureGroup};
 use crate::report::words::listed;
 use cft_ident_core::diagnose::{FormulaEnd, FormulaPicture};
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, FormulaResult, LoggedRobot, formula_result};
+use cft_ident_stages::identify::{Diagnosed, FormulaResult, RobotSetup, formula_result};
 
 const NONE: &str = "No formula of few terms explains what is left of a joint: the signals on which it depends stand with it.";
 
 /// The result of a search for a screen: each formula that is confirmed, and why the others are not.
-pub(super) fn in_short(usual: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+pub(super) fn in_short(usual: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
     if !found.searched {
         return;
     }
     let formulas = found.diagnosis.formulas.iter();
-    let results: Vec<FormulaResult> = formulas.map(|f| formula_result(machine, f)).collect();
+    let results: Vec<FormulaResult> = formulas.map(|f| formula_result(setup, f)).collect();
     if results.is_empty() {
         usual.paragraph(NONE);
     }
@@ -39,16 +39,16 @@ pub(super) fn in_short(usual: &mut Writer, machine: &LoggedRobot, found: &Diagno
 }
 
 /// The formulas as a file for `--candidates`.
-pub(super) fn candidates(detail: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+pub(super) fn candidates(detail: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
     let formulas = found.diagnosis.formulas.iter();
     for formula in formulas.filter(|formula| formula.end == FormulaEnd::Found) {
-        let result = formula_result(machine, formula);
+        let result = formula_result(setup, formula);
         result.candidate.lines().for_each(|line| detail.line(line));
     }
 }
 
 /// The result of a search, joint by joint.
-pub(super) fn write(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+pub(super) fn write(writer: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
     if !found.searched {
         return;
     }
@@ -58,13 +58,13 @@ pub(super) fn write(writer: &mut Writer, machine: &LoggedRobot, found: &Diagnose
         writer.paragraph(NONE);
     }
     for formula in formulas {
-        let result = formula_result(machine, formula);
-        writer.paragraph(&sentence(machine, &result));
+        let result = formula_result(setup, formula);
+        writer.paragraph(&sentence(setup, &result));
         if result.end == FormulaEnd::Found {
             writer.list(numbers(&result));
             writer.details("as a table for --candidates", result.candidate.trim());
             if let Some(picture) = &formula.picture {
-                writer.figures(figure(machine, &result, picture));
+                writer.figures(figure(setup, &result, picture));
             }
         }
     }
@@ -82,12 +82,12 @@ fn why_not(of: &FormulaResult) -> String {
     }
 }
 
-fn joint_of(machine: &LoggedRobot, of: &FormulaResult) -> usize {
-    let mut names = machine.robot.joint_names().iter();
+fn joint_of(setup: &RobotSetup, of: &FormulaResult) -> usize {
+    let mut names = setup.robot.joint_names().iter();
     names.position(|name| *name == of.joint).unwrap_or(0)
 }
 
-fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
+fn sentence(setup: &RobotSetup, of: &FormulaResult) -> String {
     let mut end = match of.end {
         FormulaEnd::Found => format!(
             "It gains on blocks left out, all parts agree (s = {}), and chance makes as much in {} of searches; \
@@ -100,7 +100,7 @@ fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
     };
     if let Some(rms) = of.at_reversals {
         let [without, with] = rms.map(|rms| number::significant(rms, 3));
-        let unit = machine.file.torque_unit(joint_of(machine, of));
+        let unit = setup.file.torque_unit(joint_of(setup, of));
         end += &format!(
             " Within 0.1 s of a reversal, on data set aside, the residual is {without} without it and {with} {unit} with it (rms)."
         );
@@ -118,13 +118,13 @@ fn sentence(machine: &LoggedRobot, of: &FormulaResult) -> String {
     )
 }
 
-fn figure(machine: &LoggedRobot, of: &FormulaResult, picture: &FormulaPicture) -> PictureGroup {
-    let joint = joint_of(machine, of);
-    let unit = machine.file.torque_unit(joint).to_owned();
+fn figure(setup: &RobotSetup, of: &FormulaResult, picture: &FormulaPicture) -> PictureGroup {
+    let joint = joint_of(setup, of);
+    let unit = setup.file.torque_unit(joint).to_owned();
     let figure = EffectFigure {
         title: format!("formula of {}, on data set aside", of.joint),
         description: of.text.clone(),
-        over: axis_of(machine, joint, picture.over),
+        over: axis_of(setup, joint, picture.over),
         of: ("torque".to_owned(), unit),
         rows: picture.rows.clone(),
     };

@@ -6,13 +6,13 @@ use crate::report::sections::effects;
 use crate::report::table::Columns;
 use cft_ident_core::diagnose::FoundEffect;
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
+use cft_ident_stages::identify::{Diagnosed, RobotSetup};
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
 /// The table and the cards.
 pub(super) fn show(
     page: &mut Writer,
-    machine: &LoggedRobot,
+    setup: &RobotSetup,
     found: &Diagnosed,
     replayed: &ReplayedDiagnosis,
 ) {
@@ -22,17 +22,17 @@ pub(super) fn show(
         false => "the fitted data",
     };
     for (step, rows) in d.written().zip(&replayed.effects) {
-        let title = titled(machine, &step.estimate);
-        let said = (title, words(machine, step), no_gain(step));
-        effects::card(page, (machine, &d.model), rows, said, data);
+        let title = titled(setup, &step.estimate);
+        let said = (title, words(setup, step), no_gain(step));
+        effects::card(page, (setup, &d.model), rows, said, data);
     }
     let caption = "estimates, in the order in which the effects were found";
     let columns = Columns::new(caption, &d.steps)
-        .words("effect", |step| step.estimate.title(&machine.robot))
-        .words("parameters", |step| in_words(machine, step))
+        .words("effect", |step| step.estimate.title(&setup.robot))
+        .words("parameters", |step| in_words(setup, step))
         .percent("gain on blocks left out", |step| step.share)
         .words("grade", grade)
-        .words("torque (rms, 95 % CI)", |step| torque(machine, step))
+        .words("torque (rms, 95 % CI)", |step| torque(setup, step))
         .words("certainty", certainty);
     page.table_if_any(columns);
 }
@@ -47,7 +47,7 @@ fn no_gain(step: &FoundEffect) -> Option<String> {
 }
 
 /// The sentences on one effect beside its picture.
-fn words(machine: &LoggedRobot, step: &FoundEffect) -> Vec<String> {
+fn words(setup: &RobotSetup, step: &FoundEffect) -> Vec<String> {
     let mut words = vec![format!("Grade: {}.", grade(step))];
     if let Some([before, after]) = step.holdout {
         words.push(format!(
@@ -57,6 +57,6 @@ fn words(machine: &LoggedRobot, step: &FoundEffect) -> Vec<String> {
             worsened(step)
         ));
     }
-    words.extend(alternatives(machine, step));
+    words.extend(alternatives(setup, step));
     words
 }

@@ -10,11 +10,11 @@ use cft_ident_core::friction::estimate::{BEYOND, FrictionCurvePoint, curve_std};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::Provenance;
-use cft_ident_stages::identify::{FrictionOfJoint, IdentifiedFriction, LoggedRobot};
+use cft_ident_stages::identify::{FrictionOfJoint, IdentifiedFriction, RobotSetup};
 
 /// The parts of the report.
 pub struct Friction<'a> {
-    pub machine: &'a LoggedRobot,
+    pub setup: &'a RobotSetup,
     pub found: &'a IdentifiedFriction,
     /// The model that was written.
     pub file: &'a ModelFile,
@@ -39,7 +39,7 @@ pub fn friction(of: &Friction) -> Report {
             true => report.terminal(),
             false => report.detail(),
         };
-        law(&mut laws, of.machine, joint);
+        law(&mut laws, of.setup, joint);
     }
     report.terminal().line("");
     let (tally, _) = parameters::tally(of.file);
@@ -63,18 +63,18 @@ pub fn pictures(
     command: &str,
 ) {
     page.heading("Friction");
-    page.figures(figure(of.machine, of.found).cells());
+    page.figures(figure(of.setup, of.found).cells());
     parameters::section(page, of.file, &|_| None);
-    nuisance(page, of.machine, of.found);
+    nuisance(page, of.setup, of.found);
     page.heading("Correlated parameters");
     fit::pairs(page, of.file);
     quality::section(page, quality, &of.found.notes);
     let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
-    provenance::section(page, &of.machine.file, &inputs, &[], None, command);
+    provenance::section(page, &of.setup.file, &inputs, &[], None, command);
 }
 
 /// The parameters of one joint's law.
-fn law(laws: &mut Writer, machine: &LoggedRobot, found: &FrictionOfJoint) {
+fn law(laws: &mut Writer, setup: &RobotSetup, found: &FrictionOfJoint) {
     let e = &found.estimate;
     let parameters = found.parameters.each();
     let caption = format!(
@@ -82,10 +82,10 @@ fn law(laws: &mut Writer, machine: &LoggedRobot, found: &FrictionOfJoint) {
         found.joint,
         number::significant(e.speeds.covered[0], 2),
         number::significant(e.speeds.covered[1], 3),
-        machine.robot.joint_kind(found.index).position_unit(),
+        setup.robot.joint_kind(found.index).position_unit(),
         number::percent(e.relative_error),
         number::significant(e.rmse, 3),
-        machine.file.torque_unit(found.index),
+        setup.file.torque_unit(found.index),
         e.nis.mean
     );
     let columns = Columns::new(&caption, &parameters)
@@ -142,7 +142,7 @@ fn words(of: &Friction) -> (String, bool) {
 
 /// How the filter went, joint by joint.
 fn filter(page: &mut Writer, of: &Friction) {
-    let position = |j: usize| of.machine.robot.joint_kind(j).position_unit();
+    let position = |j: usize| of.setup.robot.joint_kind(j).position_unit();
     let range = |[low, high]: [f64; 2], digits: [usize; 2]| {
         let high = number::significant(high, digits[1]);
         format!("{} to {high}", number::significant(low, digits[0]))
@@ -154,7 +154,7 @@ fn filter(page: &mut Writer, of: &Friction) {
             number::percent(joint.estimate.relative_error)
         })
         .words("residual rms", |joint| {
-            let unit = of.machine.file.torque_unit(joint.index);
+            let unit = of.setup.file.torque_unit(joint.index);
             format!("{} {unit}", number::significant(joint.estimate.rmse, 3))
         })
         .words("speeds covered", |joint| {
@@ -172,7 +172,7 @@ fn filter(page: &mut Writer, of: &Friction) {
 }
 
 /// Quantities that were estimated beside the friction.
-fn nuisance(page: &mut Writer, machine: &LoggedRobot, found: &IdentifiedFriction) {
+fn nuisance(page: &mut Writer, setup: &RobotSetup, found: &IdentifiedFriction) {
     let all = found.joints.iter();
     let all = all.flat_map(|joint| joint.estimate.nuisance.iter().map(move |n| (joint, n)));
     let all: Vec<_> = all.collect();
@@ -188,8 +188,8 @@ fn nuisance(page: &mut Writer, machine: &LoggedRobot, found: &IdentifiedFriction
         .words("joint", |(joint, _)| &joint.joint)
         .estimates(["value", "std"], |(_, n)| (n.value, n.std))
         .words("unit", |(joint, n)| {
-            let torque = machine.file.torque_unit(joint.index);
-            let position = machine.robot.joint_kind(joint.index).position_unit();
+            let torque = setup.file.torque_unit(joint.index);
+            let position = setup.robot.joint_kind(joint.index).position_unit();
             match n.unit.as_str() {
                 "torque" => torque.to_owned(),
                 "torque/acceleration" => format!("{torque} s^2/{position}"),
@@ -213,7 +213,7 @@ fn speeds_to_draw([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
 }
 
 /// The friction curves with their bands and the plateau map.
-pub fn figure(machine: &LoggedRobot, found: &IdentifiedFriction) -> FrictionFigure {
+pub fn figure(setup: &RobotSetup, found: &IdentifiedFriction) -> FrictionFigure {
     let panel = |found: &FrictionOfJoint| {
         let (j, e) = (found.index, &found.estimate);
         let [low, high] = e.speeds.covered;
@@ -230,8 +230,8 @@ pub fn figure(machine: &LoggedRobot, found: &IdentifiedFriction) -> FrictionFigu
         FrictionPanel {
             joint: found.joint.clone(),
             note: format!("NIS {:.2}", e.nis.mean),
-            speed_unit: format!("{}/s", machine.robot.joint_kind(j).position_unit()),
-            torque_unit: machine.file.torque_unit(j).to_owned(),
+            speed_unit: format!("{}/s", setup.robot.joint_kind(j).position_unit()),
+            torque_unit: setup.file.torque_unit(j).to_owned(),
             curve: curve.collect(),
             covered: vec![[-high, -low], [low, high]],
             plateaus: plateaus.collect(),

@@ -11,12 +11,12 @@ use cft_ident_core::validate::JointError;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::identify::{Campaigned, DiagnoseEnd, Diagnosed, LoggedRobot};
+use cft_ident_stages::identify::{Campaigned, DiagnoseEnd, Diagnosed, RobotSetup};
 use cft_ident_stages::replay::{ReplayedDiagnosis, ReplayedLogs};
 
 /// The parts of the report.
 pub struct IdentifyReport<'a> {
-    pub machine: &'a LoggedRobot,
+    pub setup: &'a RobotSetup,
     /// Name of the campaign.
     pub campaign: &'a str,
     pub found: &'a Campaigned,
@@ -52,7 +52,7 @@ impl IdentifyReport<'_> {
                 page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
             }
             Ok(DiagnoseEnd::Diagnosed(found)) => {
-                diagnose_words::words(self.machine, found).write(page);
+                diagnose_words::words(self.setup, found).write(page);
             }
             _ => {}
         }
@@ -61,7 +61,7 @@ impl IdentifyReport<'_> {
             Some(_) if self.diagnosed().is_some() && self.limit.is_none() => {}
             Some(validated) => {
                 let errors = validated.judged();
-                let torque_is = self.machine.file.log.torque_is;
+                let torque_is = self.setup.file.log.torque_is;
                 let words = validate::words(errors, (self.limit, torque_is), &escaped(self.unseen));
                 words.write(page);
             }
@@ -75,12 +75,12 @@ impl IdentifyReport<'_> {
 
 /// The parameters, the quality of the fit, the errors, and the effects that the model lacks.
 pub fn identify(of: &IdentifyReport) -> Report {
-    let (machine, found) = (of.machine, of.found);
+    let (setup, found) = (of.setup, of.found);
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
     of.verdicts(&mut report.everywhere());
     if let Some(diagnosed) = of.diagnosed() {
         let typed = (of.model(), of.path, of.logs);
-        diagnose::diagnosed(&mut report, (machine, diagnosed), typed);
+        diagnose::diagnosed(&mut report, (setup, diagnosed), typed);
     }
     if let Some(validated) = &found.validated {
         let caption = format!("torque on held-out data ({})", of.unseen.join(", "));
@@ -107,8 +107,8 @@ pub fn identify(of: &IdentifyReport) -> Report {
     let mut page = report.page();
     match (of.diagnosed(), &found.validated) {
         (Some(diagnosed), _) => {
-            first_screen::show(&mut page, machine, diagnosed);
-            diagnose::errors(&mut page, machine, diagnosed);
+            first_screen::show(&mut page, setup, diagnosed);
+            diagnose::errors(&mut page, setup, diagnosed);
         }
         (None, Some(validated)) => {
             let caption = "errors of the reconstructed torque on held-out data";
@@ -157,7 +157,7 @@ pub enum ShownLogs<'a> {
 
 /// Further parts of the page.
 pub fn pictures(page: &mut Writer, of: &IdentifyReport, shown: ShownLogs, origin: &CampaignOrigin) {
-    let (machine, found) = (of.machine, of.found);
+    let (setup, found) = (of.setup, of.found);
     if let Some((laws, _)) = &found.friction {
         page.heading("Friction");
         page.paragraph(
@@ -165,37 +165,37 @@ pub fn pictures(page: &mut Writer, of: &IdentifyReport, shown: ShownLogs, origin
              speeds that the logs cover, and the mean torque of their plateaus, which took no part \
              in the fit.",
         );
-        page.figures(filter::figure(machine, laws).cells());
+        page.figures(filter::figure(setup, laws).cells());
     } else {
         match shown {
             ShownLogs::Nothing => {}
-            ShownLogs::Model(of) => friction::section(page, machine, &of.friction, &of.logs),
-            ShownLogs::Diagnosis(of) => friction::section(page, machine, &of.friction, &of.logs),
+            ShownLogs::Model(of) => friction::section(page, setup, &of.friction, &of.logs),
+            ShownLogs::Diagnosis(of) => friction::section(page, setup, &of.friction, &of.logs),
         }
     }
     match (shown, of.diagnosed()) {
         (ShownLogs::Diagnosis(replayed), Some(diagnosed)) => {
-            diagnose::sections(page, machine, diagnosed, replayed);
+            diagnose::sections(page, setup, diagnosed, replayed);
         }
         (ShownLogs::Model(replayed), _) => {
             if let Some(validated) = &found.validated {
                 let errors = validated.judged().joints.iter().map(JointError::headline);
-                sketch::section(page, machine, replayed.poses.as_ref(), errors);
+                sketch::section(page, setup, replayed.poses.as_ref(), errors);
             }
             let title = escaped(of.unseen);
-            torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
-            residual::section(page, machine, &replayed.residual);
+            torque::section(page, setup, &replayed.torque, &[torque::ONLY], &title);
+            residual::section(page, setup, &replayed.residual);
         }
         _ => {}
     }
     fit::section(page, &found.dynamics, of.model());
     quality::section(page, origin.quality, origin.warnings);
-    let (file, summary) = (&machine.file, Some(&found.dynamics.summary));
+    let (file, summary) = (&setup.file, Some(&found.dynamics.summary));
     provenance::section(page, file, origin.inputs, &[], summary, origin.command);
-    let names = machine.robot.joint_names().iter().enumerate();
+    let names = setup.robot.joint_names().iter().enumerate();
     let noise = names.filter_map(|(j, joint)| {
         let std = of.model().residual_std.get(joint)?;
-        let unit = machine.file.torque_unit(j);
+        let unit = setup.file.torque_unit(j);
         Some(format!("{joint} {} {unit}", number::significant(*std, 3)))
     });
     page.paragraph(&format!(

@@ -16,13 +16,13 @@ use cft_ident_core::verdict::IDENTIFIED;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::Provenance;
 use cft_ident_stages::identify::{
-    FrictionOfFit, Gain, IdentifiedDynamics, JointResidual, LoggedRobot, MotionFit,
+    FrictionOfFit, Gain, IdentifiedDynamics, JointResidual, MotionFit, RobotSetup,
 };
 use cft_ident_stages::replay::ReplayedLogs;
 
 /// The parts of the report.
 pub struct LsqReport<'a> {
-    pub machine: &'a LoggedRobot,
+    pub setup: &'a RobotSetup,
     pub found: &'a IdentifiedDynamics,
     /// The model that was fitted.
     pub file: &'a ModelFile,
@@ -108,7 +108,7 @@ fn bars(of: &LsqReport) -> ErrorFigure {
         names: [String::new(), String::new()],
         joints: joints.collect(),
         limit: None,
-        usual: Some(usual::drawn(of.machine.file.log.torque_is)),
+        usual: Some(usual::drawn(of.setup.file.log.torque_is)),
     }
 }
 
@@ -124,16 +124,16 @@ pub fn pictures(
 ) {
     parameters::section(page, of.file, &|_| None);
     if let Some(replayed) = replayed {
-        let (machine, logs) = (of.machine, &replayed.logs);
-        friction::section(page, machine, &replayed.friction, logs);
+        let (setup, logs) = (of.setup, &replayed.logs);
+        friction::section(page, setup, &replayed.friction, logs);
         let title = logs.join(", ");
-        torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
-        residual::section(page, machine, &replayed.residual);
+        torque::section(page, setup, &replayed.torque, &[torque::ONLY], &title);
+        residual::section(page, setup, &replayed.residual);
     }
     fit::section(page, of.found, of.file);
     quality::section(page, quality, &of.found.notes);
     let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
-    let (file, summary) = (&of.machine.file, Some(&of.found.summary));
+    let (file, summary) = (&of.setup.file, Some(&of.found.summary));
     provenance::section(page, file, &inputs, &[], summary, command);
 }
 
@@ -148,7 +148,7 @@ fn words(of: &LsqReport) -> DiagnosisWords {
     let joints: Vec<&JointResidual> = of.found.joints.iter().filter(|j| j.moves()).collect();
     let square: f64 = joints.iter().map(|j| j.headline().powi(2)).sum();
     let rms = (square / joints.len().max(1) as f64).sqrt();
-    let torque_is = of.machine.file.log.torque_is;
+    let torque_is = of.setup.file.log.torque_is;
     let unusual = rms > usual::band(torque_is)[1];
     let useless = joints.iter().filter(|j| j.headline() >= 1.0);
     let useless = listed(useless.map(|j| j.joint.as_str()));

@@ -11,11 +11,11 @@ use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::Parameter;
 use cft_ident_logs::log::escape;
-use cft_ident_stages::identify::{JointInUse, LoggedRobot};
+use cft_ident_stages::identify::{JointInUse, RobotSetup};
 
 /// The parts of the report.
 pub struct ShowReport<'a> {
-    pub machine: &'a LoggedRobot,
+    pub setup: &'a RobotSetup,
     pub file: &'a ModelFile,
     pub model: &'a AugmentedModel,
     /// The errors in use, and the point at which forces are reported.
@@ -24,7 +24,7 @@ pub struct ShowReport<'a> {
 
 /// The model, first its error in use.
 pub fn show(of: &ShowReport) -> Report {
-    let name = escape(&of.machine.name);
+    let name = escape(&of.setup.name);
     let mut report = Report::new(&format!("Model {name}"));
     verdict(of).write(&mut report.everywhere());
     report.terminal().line("");
@@ -44,7 +44,7 @@ pub fn show(of: &ShowReport) -> Report {
 
 /// Error in use and parameters as figures.
 fn verdict(of: &ShowReport) -> DiagnosisWords {
-    let joints = of.machine.robot.joint_names();
+    let joints = of.setup.robot.joint_names();
     let figure = |label, value| VerdictFigure {
         label,
         value,
@@ -185,10 +185,10 @@ fn friction(to: &mut Writer, of: &ShowReport) {
 }
 
 fn effects(terminal: &mut Writer, of: &ShowReport) {
-    let robot = &of.machine.robot;
+    let robot = &of.setup.robot;
     let said = of.model.effects.iter().map(|effect| {
         let joint = effect.place.joint().unwrap_or(0);
-        escape(&effect.said_and_named(robot, of.machine.file.torque_unit(joint)))
+        escape(&effect.said_and_named(robot, of.setup.file.torque_unit(joint)))
     });
     let said: Vec<String> = said.collect();
     if !said.is_empty() {

@@ -4,7 +4,7 @@ use crate::report::words::{listed, scaled};
 use cft_ident_core::diagnose::{FoundEffect, NotWritten, StepStatus};
 use cft_ident_core::effect::ModelEffect;
 use cft_ident_core::number;
-use cft_ident_stages::identify::{LoggedRobot, accept_option, numbers_of};
+use cft_ident_stages::identify::{RobotSetup, accept_option, numbers_of};
 
 /// The joints that an effect makes worse on held-out data, with the change of their errors.
 pub(super) fn worsened(step: &FoundEffect) -> String {
@@ -58,36 +58,36 @@ pub(super) fn certainty(step: &FoundEffect) -> String {
 }
 
 /// The torque that an effect makes, root mean square, with its 95 % CI.
-pub(super) fn torque(machine: &LoggedRobot, step: &FoundEffect) -> String {
+pub(super) fn torque(setup: &RobotSetup, step: &FoundEffect) -> String {
     let [torque, std] = step.torque;
-    let unit = machine
+    let unit = setup
         .file
         .torque_unit(step.estimate.place.joint().unwrap_or(0));
     format!("{} {unit}", number::plus_minus(torque, 1.96 * std))
 }
 
 /// An effect that is not written, in a line: its torque, what it would gain, and what writes it.
-pub(super) fn seen(machine: &LoggedRobot, step: &FoundEffect) -> Option<String> {
-    let option = accept_option(&step.estimate, &machine.robot);
+pub(super) fn seen(setup: &RobotSetup, step: &FoundEffect) -> Option<String> {
+    let option = accept_option(&step.estimate, &setup.robot);
     (step.status == StepStatus::Seen && !step.accepted_by_user).then(|| {
         format!(
             "seen: {} {}, {} of the squared error; `{option}`",
-            step.estimate.title(&machine.robot),
-            torque(machine, step),
+            step.estimate.title(&setup.robot),
+            torque(setup, step),
             number::percent(step.share.max(0.0)),
         )
     })
 }
 
 /// The name of an effect where it was found.
-pub(super) fn titled(machine: &LoggedRobot, effect: &ModelEffect) -> String {
-    let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
-    effect.said_and_named(&machine.robot, unit)
+pub(super) fn titled(setup: &RobotSetup, effect: &ModelEffect) -> String {
+    let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+    effect.said_and_named(&setup.robot, unit)
 }
 
 /// Estimated parameters of an effect in words: `order = 14.0 1/m, ..`.
-pub(super) fn in_words(machine: &LoggedRobot, step: &FoundEffect) -> String {
-    let words = numbers_of(machine, step).into_iter().map(|t| {
+pub(super) fn in_words(setup: &RobotSetup, step: &FoundEffect) -> String {
+    let words = numbers_of(setup, step).into_iter().map(|t| {
         let (scale, unit) = scaled(t.unit.as_ref(), [t.value]);
         let value = match t.std {
             Some(std) if std > 0.0 => number::plus_minus(scale * t.value, scale * std),
@@ -100,8 +100,8 @@ pub(super) fn in_words(machine: &LoggedRobot, step: &FoundEffect) -> String {
 }
 
 /// Names of the effects that these data do not separate from it, and how that can be done.
-pub(super) fn alternatives(machine: &LoggedRobot, step: &FoundEffect) -> Option<String> {
-    let names = listed(step.alternatives.iter().map(|c| c.title(&machine.robot)));
+pub(super) fn alternatives(setup: &RobotSetup, step: &FoundEffect) -> Option<String> {
+    let names = listed(step.alternatives.iter().map(|c| c.title(&setup.robot)));
     let by = step.estimate.law.entry.separate_by;
     (!names.is_empty())
         .then(|| format!("these data do not separate it from {names}; to tell them apart, {by}"))

@@ -16,12 +16,12 @@ use cft_ident_core::number;
 use cft_ident_core::validate::{JointError, TorqueErrors, TorqueValidation};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, TorqueIs, escape};
-use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for};
+use cft_ident_stages::identify::{ErrorsByUse, RobotSetup, Validated, not_a_validation, used_for};
 use cft_ident_stages::replay::ReplayedLogs;
 
 /// The parts of the report.
 pub struct ValidateReport<'a> {
-    pub machine: &'a LoggedRobot,
+    pub setup: &'a RobotSetup,
     pub file: &'a ModelFile,
     pub model: &'a AugmentedModel,
     /// Names of the logs.
@@ -47,7 +47,7 @@ pub fn validate(of: &ValidateReport) -> Report {
     ));
     let by_use = of.found.by_use.as_ref();
     let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
-    let torque_is = of.machine.file.log.torque_is;
+    let torque_is = of.setup.file.log.torque_is;
     let mut said = words(judged, (of.limit, torque_is), &escaped(logs));
     if let Some(note) = not_a_validation(judged) {
         let (grade, text) = ("not a validation", note.to_string());
@@ -73,7 +73,7 @@ pub fn validate(of: &ValidateReport) -> Report {
     report.terminal().next(next, Some(command.to_owned()));
     report.page().next(on_page, None);
     report.terminal().line("");
-    let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
+    let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.setup.name);
     let whole = caption(logs);
     summary::largest_errors(&mut report.usual(), &whole, &judged.joints);
     errors_by_joint(&mut report.detail(), judged, &whole);
@@ -114,7 +114,7 @@ fn bars(of: &ValidateReport) -> ErrorFigure {
         names: ["on logs that made the model", "on unseen logs"].map(str::to_owned),
         joints: joints.collect(),
         limit: of.limit,
-        usual: Some(usual::drawn(of.machine.file.log.torque_is)),
+        usual: Some(usual::drawn(of.setup.file.log.torque_is)),
     }
 }
 
@@ -131,12 +131,12 @@ pub fn pictures(
     parameters::section(page, of.file, &|_| None);
     match replayed {
         Some(replayed) => {
-            let machine = of.machine;
+            let setup = of.setup;
             let errors = of.found.judged().joints.iter().map(JointError::headline);
-            sketch::section(page, machine, replayed.poses.as_ref(), errors);
-            friction::section(page, machine, &replayed.friction, &replayed.logs);
-            torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
-            residual::section(page, machine, &replayed.residual);
+            sketch::section(page, setup, replayed.poses.as_ref(), errors);
+            friction::section(page, setup, &replayed.friction, &replayed.logs);
+            torque::section(page, setup, &replayed.torque, &[torque::ONLY], &title);
+            residual::section(page, setup, &replayed.residual);
         }
         None => {
             page.heading("Torque, measured and reconstructed");
@@ -152,7 +152,7 @@ pub fn pictures(
     quality::section(page, quality, &of.found.notes);
     let mut inputs = vec![of.given.clone()];
     inputs.extend(of.found.inputs.iter().cloned());
-    let (file, made_from) = (&of.machine.file, &of.file.provenance.inputs);
+    let (file, made_from) = (&of.setup.file, &of.file.provenance.inputs);
     let summary = Some(&validation.summary);
     provenance::section(page, file, &inputs, made_from, summary, command);
 }

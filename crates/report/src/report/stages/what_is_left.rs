@@ -5,11 +5,11 @@ use crate::report::figure::MapFigure;
 use crate::report::words::{listed, scaled};
 use cft_ident_core::diagnose::{ResidualMap, Signal};
 use cft_ident_core::number;
-use cft_ident_stages::identify::{Diagnosed, LoggedRobot, signal_words};
+use cft_ident_stages::identify::{Diagnosed, RobotSetup, signal_words};
 
 /// The signals on which the residual that is left depends, a sentence for each joint.
-pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
-    let names = machine.robot.joint_names();
+pub(super) fn sentences(setup: &RobotSetup, found: &Diagnosed) -> Vec<String> {
+    let names = setup.robot.joint_names();
     let all = &found.diagnosis.left.dependence;
     let of_joint = |(j, name): (usize, &String)| {
         let signals = all.iter().filter(|d| d.joint == j).map(|d| {
@@ -25,9 +25,9 @@ pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String>
 }
 
 /// The residual over the two signals on which it depends most, a map and a curve for each joint.
-pub(super) fn section(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+pub(super) fn section(page: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
     let all = found.diagnosis.left.dependence.iter();
-    let drawn = all.filter_map(|d| d.map.as_ref().map(|map| figure(machine, d.joint, map)));
+    let drawn = all.filter_map(|d| d.map.as_ref().map(|map| figure(setup, d.joint, map)));
     let drawn: Vec<MapFigure> = drawn.collect();
     if drawn.is_empty() {
         return;
@@ -42,10 +42,10 @@ pub(super) fn section(page: &mut Writer, machine: &LoggedRobot, found: &Diagnose
     }
 }
 
-fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
-    let names = machine.robot.joint_names();
-    let torque = machine.file.torque_unit(joint);
-    let over = map.signals.map(|signal| axis_of(machine, joint, signal));
+fn figure(setup: &RobotSetup, joint: usize, map: &ResidualMap) -> MapFigure {
+    let names = setup.robot.joint_names();
+    let torque = setup.file.torque_unit(joint);
+    let over = map.signals.map(|signal| axis_of(setup, joint, signal));
     let [across, up] = [0, 1].map(|s: usize| scaled(&over[s].1, map.ends[s]));
     let means = map.curve.iter().map(|[_, mean, _]| *mean);
     let low = means.clone().fold(0.0, f64::min);
@@ -75,19 +75,16 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
 }
 
 /// Name and unit of a signal of a joint.
-pub(super) fn axis_of(machine: &LoggedRobot, joint: usize, signal: Signal) -> (String, String) {
-    let position = |j: usize| machine.robot.joint_kind(j).position_unit();
+pub(super) fn axis_of(setup: &RobotSetup, joint: usize, signal: Signal) -> (String, String) {
+    let position = |j: usize| setup.robot.joint_kind(j).position_unit();
     let unit = match signal {
         Signal::Position(j) => position(j).to_owned(),
         Signal::Speed(j) => format!("{}/s", position(j)),
         Signal::Acceleration => format!("{}/s\u{b2}", position(joint)),
-        Signal::Load => machine.file.torque_unit(joint).to_owned(),
+        Signal::Load => setup.file.torque_unit(joint).to_owned(),
         Signal::Direction => "1".to_owned(),
         Signal::SinceReversal | Signal::Time => "s".to_owned(),
         Signal::Temperature(_) => "degC".to_owned(),
     };
-    (
-        signal_words(machine.robot.joint_names(), joint, signal),
-        unit,
-    )
+    (signal_words(setup.robot.joint_names(), joint, signal), unit)
 }

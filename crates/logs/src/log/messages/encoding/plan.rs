@@ -1,7 +1,7 @@
 //! Which numbers are taken from the messages of one type: field paths resolved against its definition.
 
 use super::msg::{ElementCount, ElementType, Field, PrimitiveType};
-use crate::log::recording::path::PathStep;
+use crate::log::messages::path::PathStep;
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct MessagePlan {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::log::content::{ContentBytes, FileContent, unpacked_chunk};
-use crate::log::recording::message::{
+use crate::log::messages::message::{
     MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
 };
 use crate::log::{LogError, source};

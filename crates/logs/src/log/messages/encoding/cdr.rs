@@ -7,9 +7,9 @@ use super::cursor::{ByteCursor, ByteSpan, Encoding, MalformedMessage};
 use super::leaves;
 use super::msg::{self, ElementType, Field, MessageFields};
 use super::plan::{ElementSelector, MessagePlan, PlanNode, PlanSlot};
-use crate::log::recording::message::{FieldLeaf, MessageReader, OpenedReader, Schema, UnevenArray};
-use crate::log::recording::path::{FieldPath, PathStep};
-use crate::log::recording::value::Value;
+use crate::log::messages::message::{FieldLeaf, MessageReader, OpenedReader, Schema, UnevenArray};
+use crate::log::messages::path::{FieldPath, PathStep};
+use crate::log::messages::value::Value;
 
 /// Messages in CDR, and in the packed form of ROS 1, by their `.msg` definitions.
 pub(super) fn open(schema: &Schema, fields: &[Vec<FieldPath>]) -> Option<OpenedReader> {

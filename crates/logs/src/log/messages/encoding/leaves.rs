@@ -2,8 +2,8 @@
 
 use super::cursor::{ByteCursor, Encoding, MalformedMessage};
 use super::msg::{ElementCount, ElementType, Field};
-use crate::log::recording::message::{FieldLeaf, MOST_LEAVES, name_elements};
-use crate::log::recording::path::{FieldPath, PathStep};
+use crate::log::messages::message::{FieldLeaf, MOST_LEAVES, name_elements};
+use crate::log::messages::path::{FieldPath, PathStep};
 
 /// What a message holds, as far as numbers and the texts that name them go.
 pub(super) enum Tree {

@@ -9,11 +9,11 @@ use super::descriptor::{FieldKind, FieldType, MessageType, MessageTypes, NumberT
 use super::elements::{count, field, number_of, packed_number, text_is};
 use super::leaves::{Tree, of_tree};
 use super::wire::{BrokenBytes, WireFields, WireValue, elements};
-use crate::log::recording::message::{
+use crate::log::messages::message::{
     FieldLeaf, MOST_LEAVES, MessageReader, OpenedReader, Schema, UnevenArray,
 };
-use crate::log::recording::path::{FieldPath, PathStep};
-use crate::log::recording::value::Value;
+use crate::log::messages::path::{FieldPath, PathStep};
+use crate::log::messages::value::Value;
 
 /// Steps that a path may have.
 const MAX_PATH_STEPS: usize = 16;

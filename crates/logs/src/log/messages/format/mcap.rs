@@ -15,7 +15,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::record::{CUT, ChannelRecord, MessageRecord, SchemaRecord};
 use crate::log::content::{CompressionFormat, ContentBytes, FileContent};
-use crate::log::recording::message::{
+use crate::log::messages::message::{
     MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
 };
 use crate::log::{LogError, source};

@@ -14,7 +14,7 @@ use rusqlite::{Connection, OpenFlags, params};
 use tempfile::TempDir;
 
 use crate::log::content::{CompressionFormat, FileContent};
-use crate::log::recording::message::{
+use crate::log::messages::message::{
     MessageFile, MessageHead, RecordingBreak, Schema, Topic, is_wanted,
 };
 use crate::log::{LogError, escape_whole, source};

@@ -4,9 +4,9 @@ use serde_json::Value as Json;
 
 use super::leaves::{Tree, of_tree};
 use crate::log::json_text::parsed;
-use crate::log::recording::message::{FieldLeaf, MessageReader, OpenedReader, Schema, UnevenArray};
-use crate::log::recording::path::{FieldPath, PathStep};
-use crate::log::recording::value::Value;
+use crate::log::messages::message::{FieldLeaf, MessageReader, OpenedReader, Schema, UnevenArray};
+use crate::log::messages::path::{FieldPath, PathStep};
+use crate::log::messages::value::Value;
 
 struct JsonReader {
     fields: Vec<Vec<FieldPath>>,

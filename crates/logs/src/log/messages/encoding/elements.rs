@@ -2,7 +2,7 @@
 
 use super::descriptor::{FieldKind, FieldType, MessageType, NumberType};
 use super::wire::{BrokenBytes, WireValue, elements, fixed, varint};
-use crate::log::recording::value::Value;
+use crate::log::messages::value::Value;
 
 pub(super) fn field<'t>(kind: &'t MessageType, name: &str) -> Option<&'t FieldType> {
     kind.fields.iter().find(|field| field.name == name)

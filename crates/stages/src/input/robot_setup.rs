@@ -27,7 +27,7 @@ pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
 
 /// A robot as its file describes it.
 #[derive(Debug, Clone)]
-pub struct LoggedRobot {
+pub struct RobotSetup {
     /// Name of the file, for messages.
     pub name: String,
     pub file: RobotFile,
@@ -38,7 +38,7 @@ pub struct LoggedRobot {
     pub(crate) position_cutoffs_hz: Arc<Vec<f64>>,
 }
 
-impl LoggedRobot {
+impl RobotSetup {
     /// Reads a robot file, or one that comes with the tool, such as `configs/cft.toml`.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl LoggedRobot {
     /// The robot of a file that is read already.
     pub fn new(name: &str, file: RobotFile) -> Self {
         let robot = file.robot();
-        LoggedRobot {
+        RobotSetup {
             name: name.to_owned(),
             file,
             robot,
@@ -61,7 +61,7 @@ impl LoggedRobot {
 
     /// The robot of a model, its set-up kept as it is declared where that of the model was.
     pub fn of_model(name: &str, model: &ModelFile) -> Self {
-        LoggedRobot {
+        RobotSetup {
             as_declared: model.provenance.as_declared,
             ..Self::new(name, model.robot.clone())
         }
@@ -69,16 +69,16 @@ impl LoggedRobot {
 
     /// The same robot with another file, which its logs are looked at again by.
     pub(crate) fn with_file(&self, file: RobotFile) -> Self {
-        LoggedRobot {
+        RobotSetup {
             as_declared: self.as_declared,
-            ..LoggedRobot::new(&self.name, file)
+            ..RobotSetup::new(&self.name, file)
         }
     }
 
     /// The same robot, its file taken at its word: a set-up that contradicts itself or the logs ends no
     /// stage.
     pub fn as_declared(self) -> Self {
-        LoggedRobot {
+        RobotSetup {
             as_declared: true,
             ..self
         }
@@ -103,10 +103,10 @@ impl LoggedRobot {
     }
 
     /// The same robot whose logs are not mended of a fault.
-    pub(crate) fn keeping(&self, fault: RowFault) -> LoggedRobot {
+    pub(crate) fn keeping(&self, fault: RowFault) -> RobotSetup {
         let mut file = self.file.clone();
         file.log.keep.push(fault);
-        LoggedRobot {
+        RobotSetup {
             file,
             ..self.clone()
         }

@@ -6,7 +6,7 @@
 use thiserror::Error;
 
 use super::msg::{ElementCount, PrimitiveType};
-use crate::log::recording::value::Value;
+use crate::log::messages::value::Value;
 
 #[derive(Debug, Error)]
 pub(super) enum MalformedMessage {
