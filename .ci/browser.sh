@@ -1,15 +1,25 @@
 #!/bin/bash
 # The HTML reports in headless Chromium: they load without an error, every figure is drawn, zooming
 # works, on a wide and a narrow window, in light and dark, with and without a script.
-#   .ci/browser.sh PAGE.html...
+#   .ci/browser.sh [PAGE.html...]        (no page: only brings what opens them; CI_BROWSER=FOLDER keeps it there)
 # Says so, and passes, where Chromium, node or the package that drives it cannot be had.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+browser=${CI_BROWSER:-$work}
+mkdir -p "$browser"
+exec 9> "$browser/lock"
+flock 9
+
 skip() {
   echo "== browser: SKIPPED, $1"
+  echo "$1" > "$browser/missing"
   exit 0
 }
+
+[ -s "$browser/missing" ] && skip "$(cat "$browser/missing")"
 
 for program in node npm; do
   command -v "$program" > /dev/null || skip "$program is not installed"
@@ -28,11 +38,12 @@ done
 pages=()
 for page in "$@"; do pages+=("$(realpath "$page")"); done
 driver=$(realpath .ci/browser.mjs)
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-echo '{"private":true}' > package.json
-timeout 120 npm install --silent --no-audit --no-fund playwright-core > npm.log 2>&1 ||
-  skip "playwright-core cannot be installed: $(tail -n 1 npm.log)"
+cd "$browser" || exit 1
+if [ ! -d node_modules/playwright-core ]; then
+  echo '{"private":true}' > package.json
+  timeout 120 npm install --silent --no-audit --no-fund playwright-core > npm.log 2>&1 ||
+    skip "playwright-core cannot be installed: $(tail -n 1 npm.log)"
+fi
+[ ${#pages[@]} -gt 0 ] || exit 0
 "$chromium" --version 2> /dev/null
 node "$driver" "$chromium" "${pages[@]}"

@@ -1,5 +1,5 @@
 #!/bin/bash
-# The recipe of the conda package, rendered in a fresh virtual environment; nothing is built.
+# The recipe of the conda package, rendered; nothing is built.
 #   .ci/conda.sh
 set -eu
 cd "$(dirname "$0")/.."
@@ -13,6 +13,5 @@ python=$(command -v python3) || skip "python3 is not installed"
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || skip "python3 is older than 3.11"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$python" -m venv "$work/venv" || skip "python3 has no venv (on Debian: apt install python3-venv)"
-"$work/venv/bin/pip" install -q py-rattler-build || skip "pip cannot install py-rattler-build"
-"$work/venv/bin/python" packaging/conda/rendered.py
+venv=$(.ci/venv "$work/venv" conda 2> "$work/venv.log") || skip "$(cat "$work/venv.log")"
+"$venv/bin/python" packaging/conda/rendered.py

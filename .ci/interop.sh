@@ -1,7 +1,7 @@
 #!/bin/bash
 # The official Python packages of MCAP, ROS 2 and protobuf against this tool, both ways.
 #   .ci/interop.sh TOOL
-# Installs the packages into a folder of its own, has them write a log that no fixture holds in every
+# Has the packages write a log that no fixture holds in every
 # format and runs the tests of the fixtures on it; then has them read what this tool writes. Says so,
 # and passes, where the packages cannot be had.
 set -u
@@ -16,19 +16,15 @@ skip() {
 command -v python3 > /dev/null || skip "python3 is not installed"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-python3 -m venv "$work/venv" > "$work/venv.log" 2>&1 ||
-  skip "python3 cannot make a virtual environment: $(tail -n 1 "$work/venv.log")"
-timeout 300 "$work/venv/bin/pip" install --quiet --disable-pip-version-check \
-  mcap mcap-ros2-support mcap-protobuf-support rosbags zstandard > "$work/pip.log" 2>&1 ||
-  skip "the Python packages cannot be installed: $(tail -n 1 "$work/pip.log")"
-"$work/venv/bin/pip" list --disable-pip-version-check 2> /dev/null |
+venv=$(.ci/venv "$work/venv" formats 2> "$work/venv.log") || skip "$(cat "$work/venv.log")"
+"$venv/bin/pip" list --disable-pip-version-check 2> /dev/null |
   grep -iE "^(mcap|rosbags|protobuf|zstandard)"
 export PYTHONDONTWRITEBYTECODE=1
 
 # Theirs, read by this tool: another motion and another seed than those of the fixtures.
 tool() { "$tool" "$@" < /dev/null; }
 tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/sim.csv" > /dev/null || exit 1
-"$work/venv/bin/python" fixtures/logs/make.py "$work/sim.csv" "$work/logs" || exit 1
+"$venv/bin/python" fixtures/logs/make.py "$work/sim.csv" "$work/logs" || exit 1
 # the whole workspace's build, which the tests have made already: one package alone has other features
 CFT_IDENT_LOGS="$work/logs" cargo test --locked --test logs log_fixtures || exit 1
 
@@ -40,16 +36,15 @@ fi
 tool convert -q "$work/sim.csv" "$work/converted.mcap" > /dev/null || exit 1
 tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/simulated.mcap" > /dev/null ||
   exit 1
-"$work/venv/bin/python" fixtures/logs/read.py "$work/sim.csv" \
+"$venv/bin/python" fixtures/logs/read.py "$work/sim.csv" \
   "$work/converted.mcap" "$work/simulated.mcap" || exit 1
 
 # What Rerun and PlotJuggler show of it: joints by their names, residuals beside the torques.
-timeout 600 "$work/venv/bin/pip" install --quiet --disable-pip-version-check rerun-sdk > "$work/pip.log" 2>&1 ||
-  skip "viewers: rerun-sdk cannot be installed: $(tail -n 1 "$work/pip.log")"
+.ci/venv "$work/venv" viewers > "$work/venv.log" 2>&1 || skip "viewers: $(head -n 1 "$work/venv.log")"
 tool example -q ur10 -o "$work/ur10" > /dev/null || exit 1
 tool lsq -q "$work/ur10/ur10.csv" -r configs/ur10.toml -o "$work/model.toml" > /dev/null || exit 1
 tool validate -q "$work/ur10/ur10.mcap" -m "$work/model.toml" -o "$work/residual.mcap" > /dev/null || exit 1
-"$work/venv/bin/python" fixtures/logs/read_viewers.py q1,q2,q4,q5 /joint_states \
+"$venv/bin/python" fixtures/logs/read_viewers.py q1,q2,q4,q5 /joint_states \
   "$work/converted.mcap" "$work/simulated.mcap" || exit 1
-"$work/venv/bin/python" fixtures/logs/read_viewers.py q1,q2,q3,q4,q5,q6 \
+"$venv/bin/python" fixtures/logs/read_viewers.py q1,q2,q3,q4,q5,q6 \
   /joint_states,/tau_hat,/residual,/band_lower,/band_upper "$work/residual.mcap"

@@ -9,9 +9,9 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python=${PYTHON:-python3}
 if ! "$python" -c 'import scipy' 2> /dev/null; then
-  python3 -m venv "$work/venv" && "$work/venv/bin/pip" -q install numpy scipy > "$work/pip" 2>&1 ||
-    { echo "== published: SKIPPED, scipy cannot be installed"; exit 0; }
-  python=$work/venv/bin/python
+  venv=$(.ci/venv "$work/venv" scipy 2> "$work/venv.log") ||
+    { echo "== published: SKIPPED, $(cat "$work/venv.log")"; exit 0; }
+  python=$venv/bin/python
 fi
 failed=0
 for row in emps tx40 panda ur10 kr300 pendulum cogging; do

@@ -1,5 +1,5 @@
 #!/bin/bash
-# The Python package from a fresh virtual environment: installed as `pip install ./python` does it, its program run, tested
+# The Python package in a virtual environment: installed as `pip install ./python` does it, its program run, tested
 # by pytest against the command line that is given, and the notebooks in a short form.
 #   .ci/python.sh TOOL
 set -eu
@@ -15,28 +15,27 @@ python=$(command -v python3) || skip "python3 is not installed"
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' || skip "python3 is older than 3.10"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$python" -m venv "$work/venv" || skip "python3 has no venv (on Debian: apt install python3-venv)"
-"$work/venv/bin/pip" install -q 'maturin>=1.7,<2' numpy pandas pytest ||
-  skip "pip cannot install maturin, numpy, pandas and pytest"
+venv=$(.ci/venv "$work/venv" python 2> "$work/venv.log") || skip "$(cat "$work/venv.log")"
+
+# brings PURPOSE: whether the packages for a purpose are there.
+brings() {
+  .ci/venv "$venv" "$1" > "$work/venv.log" 2>&1 || { echo "SKIPPED: $(head -n 1 "$work/venv.log")"; return 1; }
+}
+
 # the tests of a cluster are skipped aloud by pytest without them
-for cluster in distributed 'ray[data]'; do
-  "$work/venv/bin/pip" install -q "$cluster" || echo "SKIPPED: $cluster cannot be installed"
-done
-export VIRTUAL_ENV=$work/venv PATH=$work/venv/bin:$PATH PYTHONDONTWRITEBYTECODE=1
-# the crates below are built once for the program and the package
-export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
+brings dask || true
+brings ray || true
+export VIRTUAL_ENV=$venv PATH=$venv/bin:$PATH PYTHONDONTWRITEBYTECODE=1
 pip install -q --no-build-isolation ./python
 
 # the wheel holds the program
-installed=$work/venv/bin/cft-ident
+installed=$venv/bin/cft-ident
 [ "$("$installed" --version)" = "$("$tool" --version)" ]
 (cd "$work" && "$installed" example ur10 && "$installed" inspect ur10/ur10.csv -r ur10/ur10.toml -q)
 
 # types: the package, its stubs against the built module, and what a user writes against them
-if pip install -q mypy pandas-stubs > "$work/pip.log" 2>&1; then
+if brings types; then
   (cd "$work" && mypy --config-file "$OLDPWD/python/pyproject.toml" --cache-dir "$work/mypy" -p cft_ident && stubtest cft_ident._native)
-else
-  echo "SKIPPED: mypy cannot be installed: $(tail -n 1 "$work/pip.log")"
 fi
 
 # the programs to copy
@@ -59,15 +58,10 @@ END
 
 CFT_IDENT=$tool timeout 600 pytest -q -rs -p no:cacheprovider python/tests
 
-if pip install -q nbclient ipykernel > "$work/pip.log" 2>&1; then
+if brings notebooks; then
   for notebook in python/notebooks/*.ipynb; do
-    if grep -q '"import mujoco' "$notebook" && ! pip install -q mujoco >> "$work/pip.log" 2>&1; then
-      echo "SKIPPED: $notebook: mujoco cannot be installed"
-      continue
-    fi
     echo "$notebook"
+    ! grep -q '"import mujoco' "$notebook" || brings mujoco || continue
     CFT_IDENT_SHORT=1 timeout 300 jupyter-execute "$notebook"
   done
-else
-  echo "SKIPPED: notebooks: nbclient and ipykernel cannot be installed: $(tail -n 1 "$work/pip.log")"
 fi

@@ -1,7 +1,7 @@
 #!/bin/bash
 # Exported files in the programs that they are for: MuJoCo, Pinocchio and OpenUSD.
 #   .ci/simulators.sh TOOL [REPLAY.json]
-# Installs the packages into a folder of its own and compares the torques of each file with those of the
+# Compares the torques of each file with those of the
 # exported C along measured logs (fixtures/simulators/check.py). With REPLAY.json, writes the errors of logs
 # that are replayed in MuJoCo. Says so, and passes, where packages or logs cannot be had.
 set -u
@@ -19,12 +19,8 @@ command -v cc > /dev/null || skip "there is no C compiler \`cc\`"
 command -v python3 > /dev/null || skip "python3 is not installed"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-python3 -m venv "$work/venv" > "$work/venv.log" 2>&1 ||
-  skip "python3 cannot make a virtual environment: $(tail -n 1 "$work/venv.log")"
-timeout 600 "$work/venv/bin/pip" install --quiet --disable-pip-version-check \
-  mujoco pin usd-core numpy > "$work/pip.log" 2>&1 ||
-  skip "the Python packages cannot be installed: $(tail -n 1 "$work/pip.log")"
-"$work/venv/bin/pip" list --disable-pip-version-check 2> /dev/null |
+venv=$(.ci/venv "$work/venv" simulators 2> "$work/venv.log") || skip "$(cat "$work/venv.log")"
+"$venv/bin/pip" list --disable-pip-version-check 2> /dev/null |
   grep -iE "^(mujoco|pin|usd-core|numpy) "
 export PYTHONDONTWRITEBYTECODE=1
-"$work/venv/bin/python" fixtures/simulators/check.py "$tool" "$data" ${2:+"$2"}
+"$venv/bin/python" fixtures/simulators/check.py "$tool" "$data" ${2:+"$2"}

@@ -7,7 +7,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 root=$work/root
 mkdir "$root"
-packaging/static "$root/cft-ident"
+packaging/static "$root/cft-ident" quick
 if ldd "$root/cft-ident" > "$work/needs" 2>&1 && ! grep -q "statically linked" "$work/needs"; then
   cat "$work/needs"
   echo "== static: the program needs shared libraries"

@@ -1,8 +1,8 @@
 #!/bin/bash
 # Loads, interruptions, hostile input: the figures of docs/results/quality.md, written to docs/results/quality_*.json.
 #   benches/quality/run.sh TOOL [short] [hostile|files|interrupted|same|large]...
-# `short` takes minutes and writes nothing. Needs python3 with venv; says so, and passes, where the packages of the
-# first line below cannot be had. `coverage.sh`, `mutants.py` and `fuzz/run` make the other figures of that page.
+# `short` takes minutes and writes nothing. Needs python3 with venv; says so, and passes, where its packages
+# (.ci/venv) cannot be had. `coverage.sh`, `mutants.py` and `fuzz/run` make the other figures of that page.
 set -u
 tool=$(realpath "$1")
 shift
@@ -13,9 +13,8 @@ studies=("$@")
 [ ${#studies[@]} -gt 0 ] || studies=(hostile files interrupted same large)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-if ! python3 -m venv "$work/venv" > "$work/log" 2>&1 ||
-  ! timeout 300 "$work/venv/bin/pip" install --quiet --disable-pip-version-check numpy mcap pyarrow > "$work/log" 2>&1; then
-  echo "== quality: SKIPPED, no Python packages: $(tail -n 1 "$work/log")"
+if ! venv=$(../../.ci/venv "$work/venv" quality 2> "$work/log"); then
+  echo "== quality: SKIPPED, $(cat "$work/log")"
   exit 0
 fi
 export PYTHONDONTWRITEBYTECODE=1
@@ -33,6 +32,6 @@ for study in "${studies[@]}"; do
   more=()
   [ "$study" = same ] && more=("${other[@]}")
   echo "== quality: $study"
-  "$work/venv/bin/python" "$study.py" "$tool" "${result[@]}" "${short[@]}" "${more[@]}" || failed+=("$study")
+  "$venv/bin/python" "$study.py" "$tool" "${result[@]}" "${short[@]}" "${more[@]}" || failed+=("$study")
 done
 [ ${#failed[@]} -eq 0 ] || { echo "== quality: FAILED: ${failed[*]}"; exit 1; }
