@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup, typed,
 };
-use cft_ident_core::diagnose::DiagnosisOptions;
+use cft_ident_core::diagnose::{AcceptedEffect, DiagnosisOptions};
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident_report::report::sections::{provenance, quality, residual};
@@ -50,7 +50,8 @@ pub struct Args {
     /// Search a formula for what is left of each joint; --accept formula:JOINT writes it
     #[arg(long)]
     pub search: bool,
-    /// Write this effect whatever the data say, as NAME or NAME:JOINT; may be given more than once
+    /// Write this effect whatever the data say, as NAME or NAME:JOINT, a wave with its order as ripple:JOINT:order=12;
+    /// may be given more than once
     #[arg(hide_short_help = true, long, value_name = "EFFECT:JOINT")]
     pub accept: Vec<String>,
     /// Go on with the set-up as it is declared, whatever the torques say
@@ -90,7 +91,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         hold_friction: args.hold_friction,
         wishes: DiagnosisOptions {
             search: args.search,
-            accepted: args.accept.iter().map(|text| accepted(text)).collect(),
+            accepted: args
+                .accept
+                .iter()
+                .map(|text| AcceptedEffect::named(text))
+                .collect(),
         },
     };
     // before the logs are looked at
@@ -173,11 +178,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     if let Some(path) = &args.output {
         let unchanged = found.diagnosis.written().next().is_none();
-        let text = match unchanged {
-            true => files::text(&args.model)?,
-            false => refined.to_toml()?,
-        };
-        context.write_text(path, &text)?;
+        match unchanged {
+            true => context.write_text(path, &files::text(&args.model)?)?,
+            false => files::write_model(path, &refined, context)?,
+        }
         let unchanged = match unchanged {
             true => ", the given model byte for byte: nothing is confirmed",
             false => "",
@@ -192,12 +196,4 @@ fn at_fault(fault: &DataFault) -> CliError {
     CliError::input(stages::diagnose::at_fault(fault))
         .hint(fault.remedy.clone())
         .hint("--as-declared goes on without")
-}
-
-/// `NAME` or `NAME:JOINT`.
-fn accepted(text: &str) -> (String, Option<String>) {
-    match text.split_once(':') {
-        Some((name, joint)) => (name.to_owned(), Some(joint.to_owned())),
-        None => (text.to_owned(), None),
-    }
 }

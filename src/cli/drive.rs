@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, file_name, files, names_of, paths_of};
+use super::{
+    CliError, Context, Outcome, arguments, each_log_once, file_name, files, names_of, paths_of,
+};
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::standard::STANDARD;
 use cft_ident_drive::drive::drive_file::DriveFile;
@@ -144,6 +146,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         args.plot.as_deref(),
     ];
     context.check_outputs(inputs, outputs.into_iter().flatten())?;
+    each_log_once(&args.logs, &args.holdout)?;
     let links = args.robot.as_deref().map(links).transpose()?;
     let told = ReadRequest {
         rig: RigGiven {

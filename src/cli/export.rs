@@ -290,7 +290,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if let (Some(reason), false) = (no_torque(&effect.name), args.without_effects) {
             let (file, effect) = (&given.name, escape(&effect.name));
             let text = format!("{file}: the effect {effect} cannot be a torque: {reason}");
-            return Err(CliError::input(text).hint("export the rest with --without-effects"));
+            return Err(CliError::input(text).hint(match args.observer {
+                None => "export the rest with --without-effects",
+                // the observer's limits are those of all effects
+                Some(_) => "export the rest with --without-effects and without --observer, or fit a model without it",
+            }));
         }
     }
     let (refined, left_out) = match args.without_effects {

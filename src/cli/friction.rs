@@ -97,7 +97,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_picture(path, &figure.svg())?;
     }
     checked.write(context)?;
-    context.write_text(&args.output, &model.to_toml()?)?;
+    files::write_model(&args.output, &model, context)?;
     written(&mut report, &args.output);
     Ok(Outcome::new(report.text_for(context.screen), document))
 }

@@ -51,7 +51,7 @@ pub(super) fn run(args: &HeldRun, context: &Context) -> Result<Outcome, CliError
     if let Some(page) = args.report {
         context.write_text(page, &report.html())?;
     }
-    context.write_text(args.output, &model.to_toml()?)?;
+    files::write_model(args.output, &model, context)?;
     written(&mut report, args.output);
     let mut warnings = Vec::new();
     for (joint, unsigned) in found.joints.iter().zip(&log.unsigned) {

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::beside_truth::{BesideTruth, load_truth, true_value};
 use super::named::{self, IdentifyTarget, is_urdf};
+use super::stage_folder::StageFolder;
 use super::{
     CliError, Context, Outcome, campaign, file_name, held_out, logs_of, names_of, new, pictures,
     setup, typed, validate,
@@ -258,11 +259,7 @@ fn execute(
     let (campaign, base) = (&work.campaign, &*work.base);
     let (mut guesses, mut warnings) = (work.guesses, work.warnings);
     let roles = &campaign.logs;
-    let mut out = StageFolder {
-        path: folder,
-        context,
-        files: Vec::new(),
-    };
+    let mut out = StageFolder::new(folder, context);
     let one_joint = logs(base, &roles.friction, &roles.started)?;
     let mut training = logs(base, &roles.identification, &roles.started)?;
     let unseen = logs(base, &roles.validation, &roles.started)?;
@@ -468,32 +465,17 @@ fn keep(
 ) -> Result<(), CliError> {
     match end {
         StageEnd::Friction(found, model) => {
-            out.write("friction.toml", &model.to_toml()?)?;
+            out.write_model("friction.toml", model)?;
             out.write(
                 "friction.svg",
                 &stages::friction::figure(setup, found).svg(),
             )
         }
-        StageEnd::Dynamics(_, model) => out.write("model.toml", &model.to_toml()?),
+        StageEnd::Dynamics(_, model) => out.write_model("model.toml", model),
         StageEnd::Validated(found) => {
             let figure = stages::validate::figure(&found.validation, unseen).svg();
             out.write("validation.svg", &figure)
         }
-        StageEnd::Refined(model) => out.write("refined.toml", &model.to_toml()?),
-    }
-}
-
-/// The folder of the results, and the files that are in it.
-struct StageFolder<'a> {
-    path: &'a Path,
-    context: &'a Context,
-    files: Vec<String>,
-}
-
-impl StageFolder<'_> {
-    fn write(&mut self, name: &str, text: &str) -> Result<(), CliError> {
-        self.context.write_text(&self.path.join(name), text)?;
-        self.files.push(name.to_owned());
-        Ok(())
+        StageEnd::Refined(model) => out.write_model("refined.toml", model),
     }
 }

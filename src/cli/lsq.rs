@@ -59,7 +59,7 @@ pub struct Args {
     pub open_loop: Option<Option<f64>>,
     /// The logs hold poses, each reached from both sides, or a row for each pose: gravity, friction at rest and ratios
     /// of gains are fitted to their means
-    #[arg(long = "static", conflicts_with_all = ["model", "fit_gains", "open_loop", "unconstrained"])]
+    #[arg(long = "static", conflicts_with_all = ["model", "fit_gains", "open_loop", "unconstrained", "estimator", "leave_out", "fix_setup", "as_declared"])]
     pub held: bool,
     /// Model file to write
     #[arg(short, long, value_name = "MODEL.toml")]
@@ -154,7 +154,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     checked.write(context)?;
-    context.write_text(&args.output, &model.to_toml()?)?;
+    files::write_model(&args.output, &model, context)?;
     written(&mut report, &args.output);
     Ok(Outcome::new(report.text_for(context.screen), document))
 }

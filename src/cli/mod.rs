@@ -40,6 +40,7 @@ mod removed;
 mod setup;
 mod show;
 mod simulate;
+mod stage_folder;
 mod tool;
 mod torque;
 mod track;
@@ -62,7 +63,7 @@ use cft_ident_logs::log::LogSpec;
 use cft_ident_logs::output;
 use cft_ident_report::report::table::folded;
 use cft_ident_report::report::{Report, ReportDetail, TerminalScreen};
-use cft_ident_stages::identify::{Log, ReducedLogs, is_reduced};
+use cft_ident_stages::identify::{self as stages, Log, ReducedLogs, is_reduced};
 
 use arguments::DocumentDestination;
 use context::Context;
@@ -104,6 +105,12 @@ fn logs_of(specs: &[LogSpec]) -> Vec<Log> {
     specs.iter().map(Log::from).collect()
 }
 
+/// Refuses logs with the same rows, the fitted ones and those that are held out.
+fn each_log_once(fitted: &[LogSpec], held_out: &[LogSpec]) -> Result<(), CliError> {
+    let roles = [("fit", logs_of(fitted)), ("holdout", logs_of(held_out))];
+    Ok(stages::each_log_once(&roles, None)?)
+}
+
 /// The same where files of reduced logs may stand for those that they were made from.
 fn logs(specs: &[LogSpec]) -> Result<Vec<Log>, CliError> {
     let mut all = Vec::new();
@@ -119,6 +126,14 @@ fn logs(specs: &[LogSpec]) -> Result<Vec<Log>, CliError> {
             );
             return Err(CliError::usage(text)
                 .hint("choose the span as the log is reduced: `cft-ident reduce LOG@0..70% ..`"));
+        }
+        if !spec.leave_out.is_empty() {
+            let text = format!(
+                "--leave-out: {} holds reduced logs, of which no stretch can be left out",
+                spec.name()
+            );
+            return Err(CliError::usage(text)
+                .hint("reduce spans without it: `cft-ident reduce LOG@0..8s LOG@10..s ..`"));
         }
         all.extend(ReducedLogs::load(&spec.path)?.as_logs());
     }

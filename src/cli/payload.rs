@@ -63,11 +63,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         written(&mut report, path);
     }
     if let Some(path) = &args.output {
-        let (model, how) = match found.loaded(&given.file) {
-            Some(loaded) => (loaded.to_toml()?, ""),
-            None => (files::text(&args.model)?, ", the given model byte for byte"),
+        let how = match found.loaded(&given.file) {
+            Some(loaded) => {
+                files::write_model(path, &loaded, context)?;
+                ""
+            }
+            None => {
+                context.write_text(path, &files::text(&args.model)?)?;
+                ", the given model byte for byte"
+            }
         };
-        context.write_text(path, &model)?;
         let line = format!("written: {}{how}", path.display());
         report.terminal().line(&line);
     }

@@ -24,7 +24,7 @@ Example:
 /// Reduce logs to what a linear fit needs of them: a small file that stands where `lsq` and
 /// `validate` take a log.
 ///
-/// From it `lsq` fits by `wls` and `ols`; the other estimators and everything that
+/// From it `lsq` fits by `wls`; the other estimators and everything that
 /// looks at single rows need the logs. Friction that a model gives with -m is held. Reduced logs may be
 /// merged: give them instead of logs.
 #[derive(Debug, Clone, clap::Args)]
@@ -146,8 +146,8 @@ fn report(found: &ReducedLogs, result: &ReducedFile, args: &Args) -> Report {
     terminal.table(table);
     terminal.line("");
     terminal.paragraph(
-        "From these `lsq` fits by wls and ols, and `validate` tells the errors of \
-         models that are linear in their columns; irls, iv, oe and everything that looks at single rows \
+        "From these `lsq` fits by wls, and `validate` tells the errors of \
+         models that are linear in their columns; ols, irls, iv, oe and everything that looks at single rows \
          need the logs.",
     );
     let (file, size) = (args.output.display(), result.bytes.div_ceil(1000));

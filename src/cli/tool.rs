@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, paths_of, written};
+use super::{CliError, Context, Outcome, arguments, each_log_once, paths_of, written};
 use cft_ident_core::explain::Explain;
 use cft_ident_logs::log::{LogSpec, Provenance, escape};
 use cft_ident_report::report::json::JsonDocument;
@@ -67,6 +67,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs = inputs.chain(beside).chain(args.urdf.as_deref());
     let outputs = [Some(args.output.as_path()), args.report.as_deref()];
     context.check_outputs(inputs, outputs.into_iter().flatten())?;
+    each_log_once(&args.logs, &args.holdout)?;
     let request = |logs: &[LogSpec], wrench: Option<String>| WrenchRequest {
         logs: logs.to_vec(),
         wrench,

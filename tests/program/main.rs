@@ -31,6 +31,12 @@ mod export_support;
 mod friction_prior;
 mod from_log_to_use;
 mod gains;
+#[allow(
+    dead_code,
+    reason = "a folder with a good log is all that is wanted of it"
+)]
+#[path = "../hostile/bench.rs"]
+mod hostile_bench;
 mod house;
 mod house_plan;
 mod identify;
@@ -48,6 +54,7 @@ mod mesh_capsules;
 mod mixed_rates;
 mod new_any_log;
 mod one_joint_logs;
+mod options;
 mod pipeline;
 mod printed_is_written;
 mod reduced;

@@ -60,7 +60,7 @@ pub use crate::held_out::hold_out::Held;
 pub use crate::held_out::residual::{JointResidual, RelativeError};
 pub use crate::held_out::torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use crate::held_out::validate::{
-    ErrorsByUse, ErrorsOfLogs, ValidateSettings, Validated, not_a_validation, used_for, validate,
+    ErrorsByUse, ErrorsOfLogs, ValidateSettings, Validated, not_a_validation, validate,
 };
 pub use crate::input::control::{Control, Progress};
 pub use crate::input::curve::friction_curve;
@@ -79,7 +79,7 @@ pub use crate::input::position_cutoff::PositionCutoff;
 pub use crate::input::reduced::{
     FORMAT, FrictionGiven, MadeWith, ReducedError, ReducedLog, ReducedLogs, is_reduced,
 };
-pub use crate::input::repeated::repeated_rows;
+pub use crate::input::repeated::{each_log_once, repeated_rows, used_for};
 pub use crate::input::robot_setup::{RobotSetup, narrowed};
 pub use crate::input::track_error::TrackError;
 pub use crate::input::unknowns::FittedUnknown;

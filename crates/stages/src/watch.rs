@@ -13,6 +13,7 @@ use crate::input::error::IdentifyError;
 use crate::input::in_use::levers;
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
+use crate::input::repeated::each_log_once;
 use crate::input::robot_setup::RobotSetup;
 use crate::input::temperatures;
 use crate::note::{ModelNote, StageNote};
@@ -167,8 +168,14 @@ pub fn watch(
             Vec::new(),
         ),
         logs => {
+            let watched = match &input {
+                RowSource::Log(log) => vec![log.clone()],
+                RowSource::Stream(_) => Vec::new(),
+            };
+            let roles = [("watched", watched), ("unloaded", logs.to_vec())];
+            each_log_once(&roles, Some(&setup.file.layout()))?;
             let logs = LogData::read_all(setup, logs, &[], control)?;
-            on_other_logs(setup, (file, refined), &logs, control)?
+            on_other_logs(setup, (name, file, refined), &logs, control)?
         }
     };
     let excesses = learnt(name, &held.joints, held.excesses.as_ref())?;

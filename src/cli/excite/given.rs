@@ -45,9 +45,9 @@ pub(super) fn add(
     if Path::new(name).extension().is_some_and(|e| e == "toml") {
         let file = files::trajectory(Path::new(name))?;
         bench.inputs.push(file.provenance);
-        let motion = Motion::of_file(&bench.machine, &file.value, args.seconds, args.seed)?;
+        let motion = Motion::of_file(&bench.machine, &file.value, bench.seconds, args.seed)?;
         let (information, rows) =
-            foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;
+            foresee::information(&bench.machine, &motion, bench.rate_hz, bench.seconds)?;
         given.add_motion(&information, rows);
         return Ok(());
     }

@@ -21,7 +21,7 @@ pub(super) fn judged(
         friction,
         from: bench.args.from.as_deref(),
         rate_hz: bench.rate_hz,
-        seconds: bench.args.seconds,
+        seconds: bench.seconds,
         criterion: &criterion_name(bench),
         seed: bench.args.seed,
     };

@@ -128,9 +128,10 @@ pub struct Args {
     /// [control], else 1000]
     #[arg(hide_short_help = true, long, value_name = "HZ", value_parser = arguments::positive)]
     pub rate: Option<f64>,
-    /// Duration of a one-joint experiment, or of a checked motion that sets none [s]
-    #[arg(hide_short_help = true, long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
-    pub seconds: f64,
+    /// Duration of a one-joint experiment, or of a checked motion that sets none [s] [default: 20, with --for what the
+    /// effect takes]
+    #[arg(hide_short_help = true, long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
     /// Draw positions, speeds and volts with their limits
     #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
     pub plot: Option<PathBuf>,
@@ -198,6 +199,8 @@ struct ExciteRun<'a> {
     aim: Option<ExciteAim>,
     rate_hz: f64,
     frequency_hz: f64,
+    /// Duration of a one-joint experiment, or of a checked motion that sets none \[s\].
+    seconds: f64,
     inputs: Vec<Provenance>,
 }
 
@@ -255,6 +258,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context,
         rate_hz,
         frequency_hz,
+        seconds: args.seconds.unwrap_or(match &aim {
+            Some(ExciteAim::Ladder { seconds, .. }) => *seconds,
+            _ => LADDER_S,
+        }),
         file,
         machine,
         robot,
@@ -290,7 +297,7 @@ fn check(bench: &mut ExciteRun, path: &Path, names: &OutputNames) -> Result<Outc
     let args = bench.args;
     let given = files::trajectory(path)?;
     bench.inputs.push(given.provenance);
-    let motion = Motion::of_file(&bench.machine, &given.value, args.seconds, args.seed)?;
+    let motion = Motion::of_file(&bench.machine, &given.value, bench.seconds, args.seed)?;
     let channels = bench.machine.channels.clone();
     let joints = bench.machine.model.robot.joint_names();
     let friction = match &given.value {
@@ -362,7 +369,7 @@ fn designs(bench: &mut ExciteRun, names: &[OutputNames]) -> Result<Outcome, CliE
                 .hint(format!("the best motion so far is written to {shown}")));
         }
         let (information, rows) =
-            foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;
+            foresee::information(&bench.machine, &motion, bench.rate_hz, bench.seconds)?;
         given.add_motion(&information, rows);
         any = true;
     }

@@ -13,13 +13,13 @@ use cft_ident_report::report::json::JsonDocument;
 use cft_ident_stages::identify::RobotSetup;
 
 pub(super) fn ladder_task(bench: &ExciteRun, joint: &str) -> LadderTask {
-    let (seconds, part) = match &bench.aim {
-        Some(ExciteAim::Ladder { seconds, part, .. }) => (*seconds, *part),
-        _ => (bench.args.seconds, 1.0),
+    let part = match &bench.aim {
+        Some(ExciteAim::Ladder { part, .. }) => *part,
+        _ => 1.0,
     };
     LadderTask {
         joint: joint.to_owned(),
-        seconds,
+        seconds: bench.seconds,
         part,
         seed: bench.args.seed,
         rate_hz: bench.rate_hz,
@@ -50,12 +50,7 @@ pub(super) fn strokes(bench: &ExciteRun, names: &OutputNames) -> Result<Outcome,
     };
     let found = design_strokes(&bench.machine, &task)?;
     let trajectory = Trajectory::Points(found.file);
-    let motion = Motion::of_file(
-        &bench.machine,
-        &trajectory,
-        bench.args.seconds,
-        bench.args.seed,
-    )?;
+    let motion = Motion::of_file(&bench.machine, &trajectory, bench.seconds, bench.args.seed)?;
     let channels = &bench.machine.channels;
     let mut judged = judged(bench, &motion, channels, None, None)?;
     judged.separates = Some(found.separation);

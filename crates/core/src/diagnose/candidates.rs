@@ -1,6 +1,6 @@
 //! Everything that a model may lack, each shape of it a candidate with columns of its own.
 
-use super::problem::case::DiagnosisCase;
+use super::problem::case::{DiagnosisCase, is_same_order};
 pub use super::problem::pass::EffectCandidate;
 use crate::effect::{
     AugmentedModel, EffectPlace, Family, LAWS, Law, LimitContext, LimitedNumber, LogCoverage,
@@ -13,17 +13,13 @@ use crate::number;
 pub fn exclude(a: &ModelEffect, b: &ModelEffect) -> bool {
     let waves = |e: &ModelEffect| e.law.entry.search == ShapeSearch::Orders;
     match a.place == b.place && a.family() == b.family() {
-        true if waves(a) && waves(b) => a.name() == b.name() && close(&a.shape, &b.shape),
+        true if waves(a) && waves(b) => a.name() == b.name() && one_wave(&a.shape, &b.shape),
         same => same,
     }
 }
 
-/// Part by which two orders differ at least.
-const MIN_ORDER_DIFFERENCE: f64 = 0.02;
-
-fn close(a: &[f64], b: &[f64]) -> bool {
-    let mut pairs = a.iter().zip(b);
-    pairs.all(|(a, b)| (a - b).abs() < MIN_ORDER_DIFFERENCE * b.abs())
+fn one_wave(a: &[f64], b: &[f64]) -> bool {
+    a.iter().zip(b).all(|(a, b)| is_same_order(*a, *b))
 }
 
 /// Whether an effect is of a joint's declared friction law: its shape, or what stands beside it.
@@ -55,9 +51,13 @@ pub fn candidates(
     let (mut out, mut not_tried) = (Vec::new(), Vec::new());
     for law in laws.filter(wanted) {
         for place in law.places(robot, &model.model.friction) {
-            if !beside(place) || known(model, law, place) {
+            let waves = law.entry.search == ShapeSearch::Orders;
+            if !beside(place) || !waves && known(model, law, place).next().is_some() {
                 continue;
             }
+            // waves come more than once, each of an order of its own
+            let known =
+                |shape: &Vec<f64>| known(model, law, place).any(|e| one_wave(&e.shape, shape));
             let mut touched = (0..robot.joints()).filter(|j| place.touches(*j));
             let shapes = match touched.all(|j| cover.joints[j].stationary) {
                 true => {
@@ -68,7 +68,7 @@ pub fn candidates(
             match shapes {
                 Ok(shapes) => {
                     let seen = seen(model, cover, case, place);
-                    let shapes = shapes.into_iter();
+                    let shapes = shapes.into_iter().filter(|shape| !known(shape));
                     out.extend(shapes.filter_map(|shape| candidate(law, place, shape, &seen)));
                 }
                 Err(lacking) => not_tried.push(NotTried {
@@ -91,11 +91,14 @@ fn beside(place: EffectPlace) -> bool {
     }
 }
 
-/// Whether the model has the effect already; only waves come more than once.
-fn known(model: &AugmentedModel, law: &Law, place: EffectPlace) -> bool {
-    let mut effects = model.effects.iter();
-    law.entry.search != ShapeSearch::Orders
-        && effects.any(|e| e.name() == law.entry.name && e.place == place)
+/// The effects of a law that the model has at a place already.
+fn known<'a>(
+    model: &'a AugmentedModel,
+    law: &'a Law,
+    place: EffectPlace,
+) -> impl Iterator<Item = &'a ModelEffect> {
+    let effects = model.effects.iter();
+    effects.filter(move |e| e.name() == law.entry.name && e.place == place)
 }
 
 fn candidate(

@@ -23,6 +23,11 @@ pub enum DiagnoseError {
     NoTorque { joint: String },
     #[explain(why.clone().of(format!("no effect {name} can be accepted")))]
     Accept { name: String, why: ErrorText },
+    #[explain(
+        "{first} and {second} say the same of one place, and a model has one of them",
+        "accept one of the two"
+    )]
+    Exclusive { first: String, second: String },
     #[explain(_0.explanation())]
     Formula(Box<FormulaError>),
     #[explain("interrupted")]

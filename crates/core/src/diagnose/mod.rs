@@ -10,6 +10,7 @@
 //! each block is left out tests and shrinks it. What is not sure is reported, and nothing weaker is put in its place.
 //! Held-out data are looked at in the end.
 
+mod accepted;
 mod candidates;
 mod change;
 mod error;
@@ -35,7 +36,7 @@ pub use outcome::{
     Diagnosis, FormulaEnd, FormulaPicture, FormulaSymmetry, FoundEffect, FoundFormula,
     FrictionChange, LeftCandidate, NotWritten, SplitErrors, StepStatus,
 };
-pub use problem::case::{DiagnosisCase, DiagnosisOptions};
+pub use problem::case::{AcceptedEffect, DiagnosisCase, DiagnosisOptions};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::formula_numbers::{FORMULA_NUMBERS, FormulaNumbers};
 pub use problem::prior::ParameterPrior;

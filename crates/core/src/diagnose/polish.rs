@@ -41,7 +41,7 @@ impl PreparedCase<'_> {
         let mut list = candidates.to_vec();
         for (i, candidate) in list.iter_mut().enumerate() {
             if !chosen.iter().any(|c| c.candidate == i) {
-                candidate.bounds.clear();
+                candidate.clear_columns();
             }
         }
         let start = self.there(&list, chosen, &values, &[]);

@@ -28,6 +28,8 @@ pub struct ChosenCandidate {
     pub error: f64,
     /// Candidates of another name that gain as much, best first.
     pub alternatives: Vec<usize>,
+    /// The user wants it whatever the judge says.
+    pub accepted: bool,
 }
 
 /// The last look at a candidate that was not chosen.
@@ -164,6 +166,7 @@ impl<'a> Field<'a> {
             gain: taken.gain.clone(),
             error: 0.0,
             alternatives,
+            accepted: false,
         })
     }
 }

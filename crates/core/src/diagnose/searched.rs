@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::candidates::{EffectCandidate, NotTried, candidates, exclude, is_friction_law};
 use super::error::DiagnoseError;
 use super::prepared::{PreparedCase, SummedProducts};
+use super::problem::case::AcceptedEffect;
 use super::problem::fit::{declared_terms, determines_some};
 use super::problem::pass::{ColumnLayout, WeightedRows, pass};
 use super::search::{ChosenCandidate, Field, RejectedCandidate};
@@ -83,7 +84,7 @@ impl PreparedCase<'_> {
         let mut candidates = candidates.to_vec();
         let summed_too = candidates.iter_mut().zip(&summed.layout.candidates);
         let not = summed_too.filter(|(_, terms)| terms.is_empty());
-        not.for_each(|(candidate, _)| candidate.bounds.clear());
+        not.for_each(|(candidate, _)| candidate.clear_columns());
         let with = |sign: f64| {
             let stretches = self.data.stretches.par_iter().enumerate();
             let noisy = stretches.map(|(seed, s)| {
@@ -189,65 +190,70 @@ impl PreparedCase<'_> {
         not_tried: &[NotTried],
         chosen: &mut Vec<ChosenCandidate>,
     ) -> Result<(), DiagnoseError> {
-        let wishes = &self.case.wishes;
+        let (wishes, robot) = (&self.case.wishes, &self.case.given.model.robot);
         for wanted in wishes.accepted.iter().filter(|w| !wishes.is_formula(w)) {
-            let is = |c: usize| self.case.is_named(&field.candidates[c].effect, wanted);
-            if chosen.iter().any(|c| is(c.candidate)) {
+            let is = |c: usize| wanted.is(&field.candidates[c].effect, robot);
+            let found = chosen.iter_mut().filter(|c| is(c.candidate));
+            if let Some(found) = found.max_by(|a, b| a.gain.value.total_cmp(&b.gain.value)) {
+                found.accepted = true;
                 continue;
             }
             let own: Vec<usize> = (0..field.candidates.len()).filter(|c| is(*c)).collect();
-            let Some(first) = own.first() else {
-                return Err(self.not_there(wanted, not_tried));
+            let stays = |c: &&ChosenCandidate| {
+                let mut own = own.iter().map(|i| &field.candidates[*i].effect);
+                !own.any(|own| exclude(field.effect(c), own))
             };
-            let effect = &field.candidates[*first].effect;
-            chosen.retain(|c| !exclude(field.effect(c), effect));
-            let terms = field.terms(chosen);
+            let others: Vec<ChosenCandidate> = chosen.iter().filter(stays).cloned().collect();
+            let terms = field.terms(&others);
             let left_out = field.left_out(&terms)?;
-            let with_gain = |candidate| (candidate, left_out.gain(field.terms_of(candidate)));
-            let gains = own.into_par_iter().map(with_gain).collect::<Vec<_>>();
+            let with_gain =
+                |candidate: &usize| (*candidate, left_out.gain(field.terms_of(*candidate)));
+            let gains = own.par_iter().map(with_gain).collect::<Vec<_>>();
             let best = (gains.into_iter()).max_by(|a, b| a.1.value.total_cmp(&b.1.value));
             let Some((candidate, gain)) = best else {
-                continue;
+                return Err(self.not_there(wanted, not_tried));
             };
+            let name =
+                |c: usize| AcceptedEffect::of(&field.candidates[c].effect, robot).to_string();
             if left_out.share_of_its_own(field.terms_of(candidate)) <= self.case.numbers.ridge {
-                return Err(refused(
-                    (wanted.0.as_str(), wanted.1.as_deref()),
-                    ErrorText::new("these data do not show it: its torque is zero all along, or the same as that of other parameters").remedy("log a motion in which it differs from them"),
-                ));
+                return Err(DiagnoseError::Accept {
+                    name: name(candidate),
+                    why: ErrorText::new("these data do not show it: its torque is zero all along, or the same as that of other parameters").remedy("log a motion in which it differs from them"),
+                });
             }
+            let effect = &field.candidates[candidate].effect;
+            let excluded = |c: &&ChosenCandidate| exclude(field.effect(c), effect);
+            if let Some(other) = chosen.iter().filter(excluded).find(|c| c.accepted) {
+                return Err(DiagnoseError::Exclusive {
+                    first: name(other.candidate),
+                    second: name(candidate),
+                });
+            }
+            chosen.retain(|c| !excluded(&c));
             chosen.push(ChosenCandidate {
                 candidate,
                 gain,
                 error: left_out.error(),
                 alternatives: Vec::new(),
+                accepted: true,
             });
         }
         Ok(())
     }
 
     /// Why an effect that the user wants is no candidate.
-    fn not_there(
-        &self,
-        wanted: &(String, Option<String>),
-        not_tried: &[NotTried],
-    ) -> DiagnoseError {
+    fn not_there(&self, wanted: &AcceptedEffect, not_tried: &[NotTried]) -> DiagnoseError {
         let robot = &self.case.given.model.robot;
         let own = not_tried
             .iter()
-            .find(|n| n.law.entry.name == wanted.0 && n.place.name(robot) == wanted.1);
-        let why = match own {
-            Some(own) => ErrorText::new(&own.lacking),
-            None => ErrorText::new("there is no such effect at this place, or the model has it already: see `candidates` in the JSON document for those that there are").remedy("a formula is there with --search"),
-        };
-        refused((wanted.0.as_str(), wanted.1.as_deref()), why)
-    }
-}
-
-fn refused((name, joint): (&str, Option<&str>), why: ErrorText) -> DiagnoseError {
-    let place = joint.map_or(String::new(), |j| format!(" of {j}"));
-    DiagnoseError::Accept {
-        name: format!("{name}{place}"),
-        why,
+            .find(|n| n.law.entry.name == wanted.name && n.place.name(robot) == wanted.joint);
+        DiagnoseError::Accept {
+            name: wanted.to_string(),
+            why: match own {
+                Some(own) => ErrorText::new(&own.lacking),
+                None => ErrorText::new("there is no such effect at this place, or the model has it already: see `candidates` in the JSON document for those that there are").remedy("a formula is there with --search"),
+            },
+        }
     }
 }
 

@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::accepted::refuse_failed;
 use super::candidates::no_finding;
 use super::error::DiagnoseError;
 use super::held_out::{EffectChange, HeldOutRows};
 use super::outcome::{FoundEffect, JudgedEffects, NotWritten, StepStatus};
 use super::prepared::PreparedCase;
-use super::problem::case::formula_name;
 use super::problem::data_split::LogRole;
 use super::problem::unknowns::{Unknown, step, value_of};
 use super::refit::ModelProposal;
@@ -69,6 +69,9 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<Jud
         estimates = work.readmit(&mut ways)?;
         written = work.written(&ways, &estimates)?;
     }
+    let wanted = ways.iter().filter(|way| way.accepted);
+    let wanted = wanted.filter_map(|way| Some(&way.found.as_ref()?.effect));
+    refuse_failed(prepared, &wanted.collect::<Vec<_>>(), &written.1)?;
     work.ask_those_that_left(&mut ways)?;
     work.held_out(&mut ways, &written.1)?;
     Ok(work.described(&ways, &estimates, (judge.1, written)))
@@ -87,28 +90,15 @@ struct EffectJudge<'a> {
 impl EffectJudge<'_> {
     /// The effects that were chosen, and those that the user wants.
     fn ways(&self, searched: &SearchedCase) -> Vec<PendingEffect> {
-        let case = self.prepared.case;
-        let named = |effect: &ModelEffect| {
-            let mut wanted = case.wishes.accepted.iter();
-            wanted.any(|w| case.is_named(effect, w))
-        };
-        let formula_wanted = |effect: &ModelEffect| {
-            let joint = effect.place.name(&case.given.model.robot);
-            let own = |name: &String| effect.name().starts_with(name);
-            joint.is_some_and(|j| case.wishes.wants_formula(&j) && own(&formula_name(&j)))
-        };
-        let way = |chosen: &ChosenCandidate| {
-            let effect = self.field.effect(chosen);
-            PendingEffect {
-                accepted: named(effect) || effect.law.formula.is_some() && formula_wanted(effect),
-                chosen: chosen.clone(),
-                found: None,
-                left: None,
-                came_back: false,
-                amplitude: None,
-                change: None,
-                without: None,
-            }
+        let way = |chosen: &ChosenCandidate| PendingEffect {
+            accepted: chosen.accepted,
+            chosen: chosen.clone(),
+            found: None,
+            left: None,
+            came_back: false,
+            amplitude: None,
+            change: None,
+            without: None,
         };
         searched.chosen.iter().map(way).collect()
     }

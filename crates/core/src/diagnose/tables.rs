@@ -48,7 +48,7 @@ pub struct TermPlaces {
 impl EffectEstimates {
     /// The joint fit with some effects.
     pub fn of(field: &Field, effects: &[ChosenCandidate]) -> Result<Self, DiagnoseError> {
-        let rows = field.prepared.case.prior.rows_per_independent;
+        let rows = field.prepared.case.prior.rows();
         let (terms, places) = with_shapes(field, effects);
         let fitted = field.prepared.blocks.list.len();
         let fit = JointFit::new(&field.summed.sums, fitted, terms, rows);

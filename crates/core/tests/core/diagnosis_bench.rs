@@ -89,6 +89,7 @@ pub fn case(given: &Model, stretches: Vec<Stretch>, rest_speed: f64) -> Diagnosi
             centre: given.clone(),
             information: DMatrix::zeros(size, size),
             rows_per_independent: 1.0,
+            firmness: 1.0,
         },
         open: FreeParameters {
             offset: vec![true; n],

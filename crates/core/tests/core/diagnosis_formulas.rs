@@ -1,7 +1,7 @@
 //! Formulas of what is left: a torque that no effect of the catalogue has is found as the function that it is, and
 //! noise is none.
 
-use cft_ident_core::diagnose::{Diagnosis, FormulaEnd, FoundFormula};
+use cft_ident_core::diagnose::{AcceptedEffect, Diagnosis, FormulaEnd, FoundFormula};
 use cft_ident_core::effect::{AugmentedModel, own};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::friction::ViscousCoulomb;
@@ -45,7 +45,7 @@ fn searched(more: &More, wanted: bool) -> Diagnosis {
     let mut case = case(&model(), logs(more, 0.2), 0.02);
     case.wishes.search = true;
     if wanted {
-        case.wishes.accepted = vec![("formula".to_owned(), Some("q1".to_owned()))];
+        case.wishes.accepted = vec![AcceptedEffect::named("formula:q1")];
     }
     diagnosed(&case)
 }

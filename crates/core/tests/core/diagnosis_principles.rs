@@ -2,8 +2,8 @@
 //! units, directions and clocks change nothing.
 
 use cft_ident_core::diagnose::{
-    DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisProgress, DiagnosisWatch, LogRole,
-    ModelProposal, StepStatus, diagnose, value_of,
+    AcceptedEffect, DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisProgress, DiagnosisWatch,
+    LogRole, ModelProposal, StepStatus, diagnose, value_of,
 };
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
@@ -280,7 +280,7 @@ fn friction_that_changes_from_a_time_on_is_reported_with_its_time_and_size() {
 #[test]
 fn what_the_user_wants_is_written_and_is_nothing_where_nothing_is() {
     let mut case = case(&model(1.0), logs(&|_, _| 0.0), 0.02);
-    let name = |name: &str, joint: &str| (name.to_owned(), Some(joint.to_owned()));
+    let name = |name: &str, joint: &str| AcceptedEffect::named(&format!("{name}:{joint}"));
     case.wishes.accepted = vec![name("asymmetric-friction", "q1")];
     // another Coulomb friction forward is an offset and another in both directions
     assert!(matches!(

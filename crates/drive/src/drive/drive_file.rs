@@ -28,6 +28,14 @@ pub struct DriveProvenance {
 }
 
 impl DriveFile {
+    /// Whether a text is that of drives: a robot file has a table for each of its drives.
+    pub fn is_one(text: &str) -> bool {
+        text.lines().any(|line| line.trim() == "[drive]")
+            && !text
+                .lines()
+                .any(|line| line.trim_start().starts_with("[robot"))
+    }
+
     /// Of a result.
     pub fn new(drives: &DriveResult, version: &str, inputs: &[Provenance]) -> Self {
         let written = drives.steps.iter().filter(|step| step.written);

@@ -29,7 +29,7 @@ pub struct HeldOut {
     /// Greatest acceleration [m/s^2 or rad/s^2].
     #[serde(default = "absent")]
     pub acceleration_seen: f64,
-    /// Greatest modulus of the model's torque [N or Nm].
+    /// Greatest modulus of the measured torque [N or Nm].
     pub torque_seen: f64,
     /// Standard deviation of the external torque where nothing touched the robot, by ranges of speed, the parameters'
     /// own deviation aside [N or Nm].

@@ -11,7 +11,12 @@ use super::{Layout, LogError, LogSpec, Provenance, RawBlock, RawReader, Span};
 pub fn shares_rows(a: &LogSpec, b: &LogSpec, layout: Option<&Layout>) -> bool {
     let same = |(a, b): (Vec<PathBuf>, Vec<PathBuf>)| same_bytes(&a, &b);
     let files = a.files().ok().zip(b.files().ok());
-    files.is_some_and(same) && overlap(a, b, layout)
+    // a folder that is no recording is known by its name alone
+    let one_path = a.path.canonicalize().is_ok_and(|path| {
+        let other = b.path.canonicalize();
+        other.is_ok_and(|other| other == path)
+    });
+    (one_path || files.is_some_and(same)) && overlap(a, b, layout)
 }
 
 impl Provenance {

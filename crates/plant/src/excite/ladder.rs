@@ -15,15 +15,16 @@ use cft_ident_core::math::rank;
 use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_files::config::identified::friction_unit;
-use cft_ident_files::config::trajectory::SingleJointMove;
+use cft_ident_files::config::trajectory::{SingleJointMove, Trajectory};
 
 use super::ExciteError;
 use super::foresee::{ExpectedEstimate, scaled_to_one};
 use super::from_files::place_of;
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
-use super::motion::differentiated;
+use super::motion::{Motion, differentiated};
 use super::series::MAX_COORDINATES;
+use super::usage::{ChannelUse, most_broken};
 
 /// Samples per second at which information is gathered: a bend is passed in tens of milliseconds.
 const SAMPLES_PER_SECOND: f64 = 250.0;
@@ -121,13 +122,17 @@ pub fn design_ladder(
     let evaluations = found.iter().map(|f| f.2).sum();
     let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let at_start = bench.score(&before);
-    let mut rungs = match best {
-        Some((value, rungs, _)) if value < at_start => rungs,
-        _ => usual,
-    };
     // figures that a person can read
-    for number in rungs.speeds.iter_mut().chain([&mut rungs.turn]) {
-        *number = three_digits(*number);
+    let rounded = |mut rungs: LadderDesign| {
+        for number in rungs.speeds.iter_mut().chain([&mut rungs.turn]) {
+            *number = three_digits(*number);
+        }
+        rungs
+    };
+    let best = best.filter(|(value, ..)| *value < at_start);
+    let mut rungs = rounded(best.map_or_else(|| usual.clone(), |(_, rungs, _)| rungs));
+    if bench.most_broken(&rungs)?.is_some() {
+        rungs = rounded(usual);
     }
     Ok(DesignedLadder {
         expected: bench.expectation(&rungs)?,
@@ -226,7 +231,10 @@ impl<'a> LadderBench<'a> {
                 expected = self.expectation(&usual);
             }
             match expected {
-                Ok(before) => return Ok((usual, before)),
+                Ok(before) => match self.most_broken(&usual)? {
+                    None => return Ok((usual, before)),
+                    Some(broken) => refused = Some(self.beyond(broken.channel.name, broken.share)),
+                },
                 Err(error @ ExciteError::BeyondDrive { .. }) => refused = Some(error),
                 Err(error) => return Err(error),
             }
@@ -295,14 +303,26 @@ impl<'a> LadderBench<'a> {
     fn expectation(&self, rungs: &LadderDesign) -> Result<Vec<ExpectedEstimate>, ExciteError> {
         let (expected, (used, drive)) = self.expected(&self.move_of(rungs))?;
         if used > 1.0 - self.task.reserve {
-            return Err(ExciteError::BeyondDrive {
-                joint: self.task.joint.clone(),
-                drive: self.machine.coordinate_names().swap_remove(drive),
-                used,
-                free: self.task.reserve,
-            });
+            return Err(self.beyond(self.machine.coordinate_names().swap_remove(drive), used));
         }
         Ok(expected)
+    }
+
+    fn beyond(&self, drive: String, used: f64) -> ExciteError {
+        ExciteError::BeyondDrive {
+            joint: self.task.joint.clone(),
+            drive,
+            used,
+            free: self.task.reserve,
+        }
+    }
+
+    /// The limit that a ladder breaks most, as its motion will be judged: torques with the 95 % band of the model.
+    fn most_broken(&self, rungs: &LadderDesign) -> Result<Option<ChannelUse>, ExciteError> {
+        let file = Trajectory::SingleJoint(self.move_of(rungs));
+        let (machine, task) = (self.machine, self.task);
+        let motion = Motion::of_file(machine, &file, task.seconds, task.seed)?;
+        Ok(most_broken(motion.usage(machine, &machine.channels)))
     }
 
     /// Sum of the logs of the slopes' relative variances, with a little of the others': the worst does not hide the rest.

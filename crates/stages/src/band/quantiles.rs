@@ -93,7 +93,7 @@ pub fn held_out(joint: &str, errors: &[Error], independent: f64) -> HeldOut {
         ],
         speed_seen: greatest(|e| e.speed),
         acceleration_seen: greatest(|e| e.acceleration),
-        torque_seen: greatest(|e| e.torque),
+        torque_seen: greatest(|e| e.torque + e.error),
         external_std: vec![f64::NAN; speed_edges.len() + 1],
         external_99: f64::NAN,
         speed_edges,

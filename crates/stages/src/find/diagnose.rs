@@ -20,7 +20,7 @@ use crate::input::in_memory::{InMemory, read_each};
 use crate::input::log_data::LogData;
 use crate::input::model::{own_laws, refined};
 use crate::input::position_cutoff::known;
-use crate::input::repeated::each_row_once;
+use crate::input::repeated::{each_row_once, unseen_by};
 use crate::input::robot_setup::RobotSetup;
 use crate::input::temperatures;
 use crate::note::StageNote;
@@ -175,6 +175,7 @@ pub fn diagnose(
     let setup = &together;
     let mut in_memory = read_each(setup, &each, &all, control)?;
     let contact = contacts(setup, &data.logs, control)?;
+    unseen_by((name, as_given), &in_memory.inputs[data.logs.len()..])?;
     in_memory.notes.splice(0..0, contact.iter().cloned());
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
@@ -285,23 +286,15 @@ pub fn diagnose(
         filters: case.filters.clone(),
         cutoff_hz: case.cutoff_hz,
     };
-    match &found.fitted {
-        // what `lsq` left of data set aside beside the effects is what the model with them leaves
-        Some(fitted) if by_lsq => {
-            found.held.joints.clone_from(&fitted.held_out);
-            found.held.excesses.clone_from(&fitted.excesses);
-        }
-        Some(_) => {
-            let refined = found.model(setup, as_given);
-            let tried = hold_out(
-                setup,
-                (&refined, &found.diagnosis.in_use),
-                (&data.logs, &found.in_memory.inputs),
-                control,
-            );
-            found.held = or_note(tried, &mut found.in_memory.notes)?;
-        }
-        None => {}
+    if found.fitted.is_some() {
+        let refined = found.model(setup, as_given);
+        let tried = hold_out(
+            setup,
+            (&refined, &found.diagnosis.in_use),
+            (&data.logs, &found.in_memory.inputs),
+            control,
+        );
+        found.held = or_note(tried, &mut found.in_memory.notes)?;
     }
     let _work = control.begin("free run", None);
     found.free_run = found.run_freely(setup, (name, as_given))?;
@@ -358,12 +351,12 @@ fn case(
     let open = open(setup, file, &given, hold);
     let rate = filters.row_rate_hz();
     let alone = moved_alone(&given, &in_memory.stretches, &roles);
-    // what is held is known so many times better than these data can say; its own spread stays that of its covariance
-    let firm = if hold { HELD_FIRMNESS } else { 1.0 };
     let prior = ParameterPrior {
         information: information(before, &given, &open, hold, &alone),
         centre: refined(before, name)?,
-        rows_per_independent: firm * (rate / (2.0 * processing.cutoff_hz)).max(1.0),
+        rows_per_independent: (rate / (2.0 * processing.cutoff_hz)).max(1.0),
+        // what is held is known so many times better than these data can say; its own spread stays that of its covariance
+        firmness: if hold { HELD_FIRMNESS } else { 1.0 },
     };
     let kept = settings.keep.then(|| {
         let size = given.model.parameters();

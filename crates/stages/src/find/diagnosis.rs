@@ -15,8 +15,8 @@ use crate::input::robot_setup::RobotSetup;
 use crate::open_loop::FreeRun;
 use crate::setup::Finding;
 use cft_ident_core::diagnose::{
-    FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal, SignalDependence,
-    SplitErrors, StepStatus,
+    AcceptedEffect, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
+    SignalDependence, SplitErrors, StepStatus,
 };
 use cft_ident_core::effect::ModelEffect;
 use cft_ident_core::motion::Summary;
@@ -421,10 +421,7 @@ fn found_candidate(setup: &RobotSetup, step: &FoundEffect) -> CandidateResult {
 
 /// The option of `diagnose` that writes an effect.
 pub fn accept_option(effect: &ModelEffect, robot: &Robot) -> String {
-    match effect.place.name(robot) {
-        Some(joint) => format!("--accept {}:{joint}", effect.name()),
-        None => format!("--accept {}", effect.name()),
-    }
+    format!("--accept {}", AcceptedEffect::of(effect, robot))
 }
 
 fn candidate(setup: &RobotSetup, c: &LeftCandidate) -> CandidateResult {

@@ -171,6 +171,7 @@ pub fn estimate(
     let mut account = EstimatorAccount::of(estimator);
     let shown = &mut account;
     let moves = columns.known.iter().flatten().any(KnownFriction::moves);
+    let holds = !moves && columns.known.iter().any(Option::is_some);
     let mut columns = columns;
     if moves && estimator != EstimatorKind::Oe {
         let found = with_known_friction(passes, columns, shown)?;
@@ -181,6 +182,8 @@ pub fn estimate(
         columns = found.columns;
     }
     let (mut fit, mut basis, solver) = match estimator {
+        // nothing of a law that is held is left to search: its fit is linear
+        EstimatorKind::Oe if holds => linear(passes, &columns, solve::RowWeighting::Wls)?,
         EstimatorKind::Oe => refined(passes, &columns, law, shown)?,
         EstimatorKind::Wls if law => refined(passes, &columns, law, shown)?,
         EstimatorKind::Irls => {

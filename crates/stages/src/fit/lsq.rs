@@ -165,8 +165,8 @@ pub fn lsq(
     let mut friction_prior = Vec::new();
     if let (Some(before), Some((_, file))) = (&before, friction) {
         friction_prior = before.kept(file, &passes.inputs);
-        // `oe` has the friction among its unknowns
-        if estimator != EstimatorKind::Oe {
+        // what a fit has among its unknowns is no friction beside them
+        if columns.known.iter().any(Option::is_some) {
             friction_of_fit = before.after(setup, &columns, &covariance);
             let fastest = setup.fastest(logs)?;
             notes.extend(before.beyond(setup, &columns, &covariance, &fastest));

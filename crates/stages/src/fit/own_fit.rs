@@ -128,7 +128,10 @@ impl OwnRefit<'_> {
             let (name, joint) = key_of(proposal.model, *unknown);
             let own = file.parameters.iter_mut();
             for p in own.filter(|p| p.name == name && p.joint == joint) {
-                p.value = value_of(proposal.model, *unknown);
+                let moved = value_of(proposal.model, *unknown) - p.value;
+                p.value += moved;
+                // beside inertial parameters that are kept both fits move alike
+                p.consistent = p.consistent.map(|x| x + moved);
             }
         }
         // inertial parameters that are kept are as consistent as they were

@@ -11,9 +11,6 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
 use cft_ident_logs::log::Provenance;
 
-/// Standard deviations by which two readings contradict each other: as many as a change between logs needs.
-const CONTRADICTION_DEVIATIONS: f64 = 3.0;
-
 /// What a log says of the mass on the last link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -22,7 +19,7 @@ pub enum PayloadVerdict {
     Seen,
     /// It does with the gains of the model; with a gain error of each joint it holds both that mass and zero.
     NotApartFromGains,
-    /// It does with the gains of the model; with a gain error of each joint it does not hold that mass.
+    /// It does with the gains of the model; with a gain error of each joint the two intervals do not meet.
     GainsContradict,
     /// The interval holds zero with the gains of the model.
     NoneSeen,
@@ -97,12 +94,10 @@ impl IntervalNumber {
         self.interval_95.is_some_and(|[low, _]| low > 0.0)
     }
 
-    /// Whether a value is far from it; false where there is none.
-    fn is_far_from(&self, value: f64) -> bool {
-        let [Some(own), Some(std)] = [self.value, self.std] else {
-            return false;
-        };
-        (value - own).abs() > CONTRADICTION_DEVIATIONS * std
+    /// Whether both intervals have numbers in common; one that is not known holds any.
+    fn meets(&self, other: &Self) -> bool {
+        let both = self.interval_95.zip(other.interval_95);
+        both.is_none_or(|(a, b)| a[0] <= b[1] && b[0] <= a[1])
     }
 }
 
@@ -114,7 +109,7 @@ impl PayloadVerdict {
         match held.mass.value {
             None => Self::NotDetermined,
             Some(_) if !held.mass.is_above_zero() => Self::NoneSeen,
-            Some(mass) if free.mass.is_far_from(mass) => Self::GainsContradict,
+            Some(_) if !free.mass.meets(&held.mass) => Self::GainsContradict,
             Some(_) if free.mass.is_above_zero() => Self::Seen,
             Some(_) => Self::NotApartFromGains,
         }

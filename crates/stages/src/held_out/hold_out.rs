@@ -6,6 +6,7 @@ use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::log_data::LogData;
 use crate::input::position_cutoff::known;
+use crate::input::repeated::unseen_by;
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{FitNote, StageNote};
 use crate::observe::{KEPT, Observer, QuietSample, QuietTorques};
@@ -83,7 +84,7 @@ pub(crate) fn hold_out(
 /// The same of logs that the model has nothing from.
 pub(crate) fn on_other_logs(
     setup: &RobotSetup,
-    (file, model): (&ModelFile, &AugmentedModel),
+    (name, file, model): (&str, &ModelFile, &AugmentedModel),
     logs: &[LogData],
     control: &Control,
 ) -> Result<(Held, Vec<Provenance>), IdentifyError> {
@@ -95,6 +96,7 @@ pub(crate) fn on_other_logs(
         while open.read(&mut block)? {}
         inputs.push(open.provenance()?);
     }
+    unseen_by((name, file), &inputs)?;
     let held = Trial::new(setup, (file, model), (logs, &inputs), control).run(1)?;
     Ok((held, inputs))
 }

@@ -16,7 +16,7 @@ use crate::input::of_robot::{JointRanges, TorquePeaks};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::ReducedLog;
-use crate::input::repeated::repeated_rows;
+use crate::input::repeated::{repeated_rows, used_for};
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::columns;
 use crate::note::{ModelNote, StageNote};
@@ -30,7 +30,7 @@ use cft_ident_core::validate::{
     TorqueValidation,
 };
 use cft_ident_files::config::ModelFile;
-use cft_ident_logs::log::{DataRole, Instant, Provenance};
+use cft_ident_logs::log::{Instant, Provenance};
 
 /// What `validate` found.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -83,17 +83,6 @@ impl Validated {
         let parts = parts.flat_map(|by| [&mut by.unseen.errors, &mut by.used.errors]);
         std::iter::once(&mut self.validation.errors).chain(parts)
     }
-}
-
-/// Which inputs hold rows that a model was made from.
-///
-/// By checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
-/// model was fitted to into an unseen one.
-pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
-    let held_out = |made: &Provenance| made.role == Some(DataRole::HeldOut);
-    let made_from = || (file.provenance.inputs.iter()).filter(|input| !held_out(input));
-    let used = |input: &Provenance| made_from().any(|made| made.shares_rows(input));
-    inputs.iter().map(used).collect()
 }
 
 /// What a model is tried by.

@@ -44,6 +44,12 @@ pub enum IdentifyError {
         second: String,
         second_role: &'static str,
     },
+    /// Rows that are given as unseen by a model that was made from them.
+    #[explain(
+        "{log}: {model} was made from rows of it, so that it says nothing of motion that the model has not seen",
+        "give a log, or a span of one, that made nothing of the model"
+    )]
+    RowsOfModel { log: String, model: String },
     /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
     #[explain(
         format!(
@@ -231,6 +237,7 @@ impl IdentifyError {
             Self::NoLog
             | Self::NoJoint { .. }
             | Self::LawIsNotLinear { .. }
+            | Self::Diagnose(DiagnoseError::Exclusive { .. })
             | Self::NotByMotion => ErrorKind::Usage,
             Self::Fit(FitError::TooFewRows { .. } | FitError::NothingExcited)
             | Self::Friction { .. }
@@ -255,6 +262,7 @@ impl IdentifyError {
             | Self::OtherRobotLog { .. }
             | Self::NoPayload { .. }
             | Self::SameRows { .. }
+            | Self::RowsOfModel { .. }
             | Self::Motion { .. }
             | Self::TooManyRows { .. }
             | Self::TooManySamples { .. }

@@ -5,26 +5,64 @@ use super::log::Log;
 use super::log_data::LogData;
 use super::robot_setup::RobotSetup;
 use crate::note::{LogNote, StageNote};
-use cft_ident_logs::log::{Layout, Provenance, escape, sha256, shares_rows};
+use cft_ident_files::config::ModelFile;
+use cft_ident_logs::log::{DataRole, Layout, Provenance, escape, sha256, shares_rows};
 
 /// Logs by what they are used for.
 pub(crate) type Role<'a> = (&'static str, &'a [LogData]);
 
 /// Refuses two logs with the same rows, within a role and between roles.
 pub(crate) fn each_row_once(setup: &RobotSetup, roles: &[Role]) -> Result<(), IdentifyError> {
-    let all: Vec<(&str, Log)> = roles
-        .iter()
-        .flat_map(|(role, logs)| logs.iter().map(|log| (*role, log.source())))
-        .collect();
-    let layout = setup.file.layout();
-    let logs: Vec<&Log> = all.iter().map(|(_, log)| log).collect();
-    match pairs(&logs, Some(&layout)).next() {
+    let sources = |(role, logs): &Role| (*role, logs.iter().map(LogData::source).collect());
+    let all: Vec<(&str, Vec<Log>)> = roles.iter().map(sources).collect();
+    each_log_once(&all, Some(&setup.file.layout()))
+}
+
+/// The same of logs that are not read yet; `layout` names the time column where a robot is known.
+///
+/// # Errors
+/// [`IdentifyError::SameRows`].
+pub fn each_log_once(
+    roles: &[(&'static str, Vec<Log>)],
+    layout: Option<&Layout>,
+) -> Result<(), IdentifyError> {
+    let all = roles.iter();
+    let all = all.flat_map(|(role, logs)| logs.iter().map(|log| (*role, log)));
+    let all: Vec<(&str, &Log)> = all.collect();
+    let logs: Vec<&Log> = all.iter().map(|(_, log)| *log).collect();
+    match pairs(&logs, layout).next() {
         None => Ok(()),
         Some((i, k)) => Err(IdentifyError::SameRows {
             first: all[i].1.shown(),
             first_role: all[i].0,
             second: all[k].1.shown(),
             second_role: all[k].0,
+        }),
+    }
+}
+
+/// Which inputs hold rows that a model was made from.
+///
+/// By checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
+/// model was fitted to into an unseen one.
+pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
+    let held_out = |made: &Provenance| made.role == Some(DataRole::HeldOut);
+    let made_from = || (file.provenance.inputs.iter()).filter(|input| !held_out(input));
+    let used = |input: &Provenance| made_from().any(|made| made.shares_rows(input));
+    inputs.iter().map(used).collect()
+}
+
+/// Refuses a log that is given as unseen and holds rows that the model was made from.
+pub(crate) fn unseen_by(
+    model: (&str, &ModelFile),
+    logs: &[Provenance],
+) -> Result<(), IdentifyError> {
+    let used = used_for(model.1, logs);
+    match logs.iter().zip(used).find(|(_, used)| *used) {
+        None => Ok(()),
+        Some((log, _)) => Err(IdentifyError::RowsOfModel {
+            log: escape(&log.name),
+            model: model.0.to_owned(),
         }),
     }
 }

@@ -62,9 +62,9 @@ impl PreparedCase<'_> {
         accepted.retain(|p| wishes.wants_formula(joint(p)));
         let found = |of: Option<&str>| accepted.iter().any(|p| Some(joint(p)) == of);
         let mut asked = wishes.accepted.iter().filter(|w| wishes.is_formula(w));
-        if let Some((name, joint)) = asked.find(|w| !found(w.1.as_deref())) {
+        if let Some(wanted) = asked.find(|w| !found(w.joint.as_deref())) {
             return Err(DiagnoseError::Accept {
-                name: format!("{name}:{}", joint.as_deref().unwrap_or("JOINT")),
+                name: wanted.to_string(),
                 why: "no formula was found there: see `formulas` in the JSON document".into(),
             });
         }
@@ -89,8 +89,7 @@ impl PreparedCase<'_> {
         let mut candidates = searched.candidates.clone();
         for (i, candidate) in candidates.iter_mut().enumerate() {
             if !chosen.iter().any(|c| c.candidate == i) {
-                candidate.bounds.clear();
-                candidate.slopes.clear();
+                candidate.clear_columns();
             }
         }
         for p in taken {
@@ -99,6 +98,7 @@ impl PreparedCase<'_> {
                 gain: p.selected.gain.clone(),
                 error: p.selected.error,
                 alternatives: Vec::new(),
+                accepted: true,
             });
             candidates.push(self.candidate(p)?);
         }

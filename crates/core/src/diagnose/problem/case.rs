@@ -1,14 +1,18 @@
 //! What a diagnosis is given: a model, logs, what is known and open, and what the user asks for.
 
+use std::fmt;
+
 use nalgebra::DMatrix;
 
 use super::data_split::{DataSplit, LogRole};
 use super::formula_numbers::FormulaNumbers;
 use super::prior::ParameterPrior;
 use super::unknowns::{DiagnosisUnknowns, FreeParameters};
-use crate::effect::{AugmentedModel, Law, ModelEffect};
+use crate::effect::{AugmentedModel, Law, ModelEffect, ShapeSearch};
 use crate::judge::Numbers;
 use crate::motion::{ParallelFilters, Stretch};
+use crate::number;
+use crate::robot::Robot;
 use crate::robot::drive::JointDrive;
 
 /// What a diagnosis works on.
@@ -44,24 +48,101 @@ pub struct DiagnosisCase {
     pub formula: FormulaNumbers,
 }
 
+/// An effect that is written whatever the judge says.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct AcceptedEffect {
+    pub name: String,
+    /// Its joint, where it is of one.
+    pub joint: Option<String>,
+    /// What tells it from others of its name there: the order of a wave.
+    pub shape: Vec<(String, f64)>,
+}
+
+impl AcceptedEffect {
+    /// `NAME`, `NAME:JOINT`, or either with `:KEY=VALUE` of a shape.
+    pub fn named(text: &str) -> Self {
+        let valued = |text: &str| {
+            let (key, value) = text.split_once('=')?;
+            Some((key.to_owned(), value.parse::<f64>().ok()?))
+        };
+        let (plain, shape) = match text.rsplit_once(':') {
+            Some((plain, last)) if valued(last).is_some() => (plain, valued(last)),
+            _ => (text, None),
+        };
+        let (name, joint) = match plain.split_once(':') {
+            Some((name, joint)) => (name, Some(joint.to_owned())),
+            None => (plain, None),
+        };
+        AcceptedEffect {
+            name: name.to_owned(),
+            joint,
+            shape: shape.into_iter().collect(),
+        }
+    }
+
+    /// The one that names an effect of a robot and no other that its law allows beside it.
+    pub fn of(effect: &ModelEffect, robot: &Robot) -> Self {
+        let waves = effect.law.entry.search == ShapeSearch::Orders;
+        let shape = effect.law.shape.iter().zip(&effect.shape);
+        AcceptedEffect {
+            name: effect.name().to_owned(),
+            joint: effect.place.name(robot),
+            shape: shape
+                .filter(|_| waves)
+                .map(|(key, x)| ((*key).to_owned(), *x))
+                .collect(),
+        }
+    }
+
+    /// Whether it names an effect.
+    pub(crate) fn is(&self, effect: &ModelEffect, robot: &Robot) -> bool {
+        let own = |key: &str| effect.law.shape.iter().position(|own| *own == key);
+        let mut shape = self.shape.iter();
+        effect.name() == self.name
+            && effect.place.name(robot) == self.joint
+            && shape.all(|(key, x)| own(key).is_some_and(|k| is_same_order(effect.shape[k], *x)))
+    }
+}
+
+impl fmt::Display for AcceptedEffect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.name)?;
+        if let Some(joint) = &self.joint {
+            write!(f, ":{joint}")?;
+        }
+        for (key, x) in &self.shape {
+            write!(f, ":{key}={}", number::significant(*x, 4))?;
+        }
+        Ok(())
+    }
+}
+
+/// Part by which two orders differ at least.
+const MIN_ORDER_DIFFERENCE: f64 = 0.02;
+
+/// Whether two orders are those of one wave.
+pub(crate) fn is_same_order(a: f64, b: f64) -> bool {
+    (a - b).abs() < MIN_ORDER_DIFFERENCE * b.abs()
+}
+
 /// What the user asks for besides.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct DiagnosisOptions {
-    /// Effects that are written whatever the judge says: name, and joint where it is of one.
-    pub accepted: Vec<(String, Option<String>)>,
+    /// Effects that are written whatever the judge says.
+    pub accepted: Vec<AcceptedEffect>,
     /// A formula of what is left is looked for.
     pub search: bool,
 }
 
 impl DiagnosisOptions {
     /// Whether it is the formula that is searched, of some joint: `formula:JOINT`.
-    pub(crate) fn is_formula(&self, (name, _): &(String, Option<String>)) -> bool {
-        self.search && name == FORMULA
+    pub(crate) fn is_formula(&self, wanted: &AcceptedEffect) -> bool {
+        self.search && wanted.name == FORMULA
     }
 
     /// Whether the formula of a joint is to be written.
     pub(crate) fn wants_formula(&self, joint: &str) -> bool {
-        let own = |w: &&(String, Option<String>)| w.1.as_deref() == Some(joint);
+        let own = |w: &&AcceptedEffect| w.joint.as_deref() == Some(joint);
         self.accepted.iter().filter(own).any(|w| self.is_formula(w))
     }
 }
@@ -91,15 +172,6 @@ impl DiagnosisCase {
         let robot = &self.given.model.robot;
         let filters = (&self.filters, self.cutoff_hz);
         DataSplit::of(robot, &self.stretches, &self.roles, filters)
-    }
-
-    /// Whether an effect is the one that is named, at the joint that is named.
-    pub(crate) fn is_named(
-        &self,
-        effect: &ModelEffect,
-        (name, joint): &(String, Option<String>),
-    ) -> bool {
-        effect.name() == name && effect.place.name(&self.given.model.robot) == *joint
     }
 
     /// The stretches of logs with a role.

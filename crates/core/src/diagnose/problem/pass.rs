@@ -48,6 +48,23 @@ pub struct EffectCandidate {
 }
 
 impl EffectCandidate {
+    /// Takes its columns away.
+    pub fn clear_columns(&mut self) {
+        self.bounds.clear();
+        self.slopes.clear();
+    }
+
+    /// Bounds of its coefficients, then of its slopes: of each of its columns in the rows of a joint.
+    fn bounds(&self) -> impl Iterator<Item = Bound> {
+        let slopes = self.slopes.iter().map(|(_, bound)| *bound);
+        self.bounds.iter().copied().chain(slopes)
+    }
+
+    /// Whether it has columns in the rows of a joint.
+    fn has_columns(&self, joint: usize) -> bool {
+        self.effect.place.touches(joint) && self.bounds().next().is_some()
+    }
+
     /// Columns in the rows of a joint: of its coefficients, then slopes.
     fn columns(&self, scene: &EffectScene, joint: usize) -> Vec<Vec<f64>> {
         let mut out = self.effect.columns(scene, joint);
@@ -100,9 +117,8 @@ impl ColumnLayout {
         }
         let mut torques: Vec<usize> = unknowns.columns.iter().map(Vec::len).collect();
         let terms = candidates.iter().map(|c| {
-            let bounds = c.bounds.iter().chain(c.slopes.iter().map(|(_, b)| b));
-            let mut terms: Vec<Term> = bounds.map(|b| term(*b)).collect();
-            for j in (0..joints).filter(|j| c.effect.place.touches(*j)) {
+            let mut terms: Vec<Term> = c.bounds().map(term).collect();
+            for j in (0..joints).filter(|j| c.has_columns(*j)) {
                 for term in &mut terms {
                     term.columns.push((j, torques[j]));
                     torques[j] += 1;
@@ -289,8 +305,7 @@ impl<'a> Window<'a> {
             Unknown::Offset(_) => vec![1.0; part.len()],
         };
         let mut raw: Vec<Vec<f64>> = unknowns.columns[j].iter().map(column).collect();
-        let own = |c: &&EffectCandidate| c.effect.place.touches(j) && !c.bounds.is_empty();
-        for candidate in candidates.iter().filter(own) {
+        for candidate in candidates.iter().filter(|c| c.has_columns(j)) {
             raw.extend(candidate.columns(&scene, j));
         }
         let mut hat = self.torques.hat[j].clone();

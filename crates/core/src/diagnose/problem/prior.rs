@@ -16,9 +16,16 @@ pub struct ParameterPrior {
     pub information: DMatrix<f64>,
     /// Rows that count as one independent row.
     pub rows_per_independent: f64,
+    /// How many times as firm as its information it stands against the data; 1 but for what is held.
+    pub firmness: f64,
 }
 
 impl ParameterPrior {
+    /// Rows that its information counts in.
+    pub(crate) fn rows(&self) -> f64 {
+        self.firmness * self.rows_per_independent
+    }
+
     /// Index of an unknown in the model's own order.
     fn place(&self, unknown: Unknown) -> usize {
         let model = &self.centre.model;
@@ -42,7 +49,7 @@ impl ParameterPrior {
         let u = unknowns.len();
         let places: Vec<usize> = unknowns.list.iter().map(|x| self.place(*x)).collect();
         let information = DMatrix::from_fn(u, u, |a, b| {
-            self.rows_per_independent * self.information[(places[a], places[b])]
+            self.rows() * self.information[(places[a], places[b])]
         });
         let off = unknowns.list.iter();
         let off = off.map(|x| value_of(&self.centre, *x) - value_of(model, *x));

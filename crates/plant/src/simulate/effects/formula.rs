@@ -134,8 +134,8 @@ impl CandidateFormulas {
             })?;
             if signal.remembers() {
                 let what = format!(
-                    "`{key}`: `{name}` hangs on the way before, which a plant of formulas does not keep; use backlash or \
-                     presliding of the catalogue"
+                    "`{key}`: `{name}` hangs on the way before, which a plant of formulas does not keep; simulate a model \
+                     without it, or with backlash or presliding of the catalogue in its place"
                 );
                 return Err(wrong(candidate, &what));
             }

@@ -47,7 +47,7 @@ impl Display for ModelNote {
             Self::ImpossibleTorque { error } => f.write_str(error),
             Self::Astray { astray, windows } => write!(
                 f,
-                "open loop: {astray} of {windows} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit again without --unconstrained"
+                "open loop: {astray} of {windows} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; `lsq` finds links that can exist where torques are in N and Nm and --unconstrained is not given"
             ),
             Self::ErrorsOfReduced { log } => write!(
                 f,
