@@ -100,8 +100,10 @@ class Table:
             return "crash"
         if code > 1:
             keys = [w.lstrip("-").split(":")[0].split("=")[0] for w in words]
-            return "refused" if plain[0] > 1 or any(k in said for k in keys) else "crash"
-        if words and used == plain:
+            return "refused" if plain[0] > 1 or "--" in said or any(k in said for k in keys) else "crash"
+        # a fit of currents is the plain one already
+        plain_already = words == ["--unconstrained"] and b"consistent = " not in plain[2].get("out.toml", b"")
+        if words and used == plain and not plain_already:
             return "ignored"
         model = next((name for name in ("out.toml",) if name in written and "[robot]" in written[name].decode()), None)
         if model:

@@ -16,6 +16,7 @@ use crate::held_out::open_loop::spoiled;
 use crate::input::control::{Control, Progress};
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
+use crate::input::error_kind::ErrorKind;
 use crate::input::in_memory::{InMemory, read_each};
 use crate::input::log_data::LogData;
 use crate::input::model::{own_laws, refined};
@@ -112,6 +113,20 @@ impl<'a> DiagnoseSettings<'a> {
             candidates: Vec::new(),
             hold_friction: false,
         }
+    }
+
+    /// Why no model comes out beside the effects: by the names of those that the user wants, where there are any.
+    fn refused(&self, error: IdentifyError) -> IdentifyError {
+        let wanted: Vec<String> = (self.wishes.accepted.iter())
+            .map(ToString::to_string)
+            .collect();
+        if wanted.is_empty() || error.kind() != ErrorKind::Undetermined {
+            return error;
+        }
+        IdentifyError::Diagnose(DiagnoseError::Accept {
+            name: wanted.join(" and "),
+            why: error.explanation(),
+        })
     }
 
     /// Refuses effects of a user's own that cannot be tried beside the model.
@@ -253,7 +268,7 @@ pub fn diagnose(
     let diagnosis = match (found, lock(&failed).take()) {
         (Ok(diagnosis), _) => diagnosis,
         (Err(DiagnoseError::Interrupted), _) => return Err(IdentifyError::Interrupted),
-        (Err(_), Some(error)) => return Err(error),
+        (Err(_), Some(error)) => return Err(settings.refused(error)),
         (Err(error), None) => return Err(IdentifyError::Diagnose(error)),
     };
     let by_lsq = refitting.own.is_some();
