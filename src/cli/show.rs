@@ -36,6 +36,7 @@ pub struct ShownModel {
     joints: Vec<String>,
     /// Physically consistent parameters stand beside those of the plain fit.
     consistent: bool,
+    /// What the data estimate, with deviations; `consistent` is what torques are computed with.
     parameters: Vec<Parameter>,
     effects: Vec<EffectSection>,
     /// What the errors mean in use; empty where the file does not hold what it left of data set aside.
@@ -69,7 +70,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let shown = ShownModel {
         joints: machine.robot.joint_names().to_vec(),
         consistent: file.is_consistent(),
-        parameters: file.parameters,
+        parameters: file.estimated_parameters(),
         effects: file.effects,
         in_use: in_use.unwrap_or_default(),
         point,

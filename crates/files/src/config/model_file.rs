@@ -289,6 +289,30 @@ impl ModelFile {
         plain
     }
 
+    /// The parameters as the data estimate them, each with its standard deviation. Where torques are computed with
+    /// another value, because the model predicts with a part of an effect or with physically consistent parameters,
+    /// `consistent` is that value.
+    pub fn estimated_parameters(&self) -> Vec<Parameter> {
+        let estimated = self.parameters.iter().map(|parameter| {
+            let Some(estimate) = self.estimate(&parameter.name, parameter.joint.as_deref()) else {
+                return parameter.clone();
+            };
+            Parameter {
+                value: estimate.value,
+                std: estimate.std,
+                consistent: Some(parameter.in_use()),
+                ..parameter.clone()
+            }
+        });
+        estimated.collect()
+    }
+
+    /// The estimate of a number, a parameter or `EFFECT KEY`, where the model computes torques with another value.
+    pub fn estimate(&self, name: &str, joint: Option<&str>) -> Option<&Estimate> {
+        let mut all = self.estimates.iter();
+        all.find(|estimate| estimate.name == name && estimate.joint.as_deref() == joint)
+    }
+
     /// A parameter by name, of one joint or of none; `file` names the model in the error.
     pub fn parameter(
         &self,

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 use cft_ident_files::config::model_file::{
-    Covariance, EffectParameter, EffectSection, FrictionPrior, ModelFile, ModelProvenance,
-    Parameter, Verdict,
+    Covariance, EffectParameter, EffectSection, Estimate, FrictionPrior, ModelFile,
+    ModelProvenance, Parameter, Verdict,
 };
 use cft_ident_files::config::{ConfigError, RobotFile};
 use cft_ident_logs::log::Provenance;
@@ -325,5 +325,29 @@ proptest! {
         };
         prop_assert_eq!(bits(&written), bits(&read));
         prop_assert_eq!(written, read);
+    }
+}
+
+#[test]
+fn a_parameter_is_its_estimate_with_its_deviation_beside_the_value_that_torques_are_computed_with()
+{
+    let mut model = model(&[1.5]);
+    model.estimates = vec![Estimate {
+        name: "viscous".to_owned(),
+        joint: Some("q4".to_owned()),
+        value: 2.0,
+        std: Some(0.25),
+        unit: "kg m^2".to_owned(),
+    }];
+    for parameter in model.estimated_parameters() {
+        let expected = match parameter.key().as_str() {
+            "viscous:q4" => (2.0, Some(0.25), 1.5),
+            key => {
+                let written = model.parameters.iter().find(|p| p.key() == key).unwrap();
+                (written.value, written.std, written.in_use())
+            }
+        };
+        let shown = (parameter.value, parameter.std, parameter.in_use());
+        assert_eq!(shown, expected, "{}", parameter.key());
     }
 }

@@ -24,7 +24,8 @@ fn is_open(p: &Parameter) -> bool {
 
 /// How many parameters have which verdict, in words, and whether all are identified or negligible.
 pub fn tally(model: &ModelFile) -> (String, bool) {
-    let rated = || model.parameters.iter().filter(|p| p.verdict.is_some());
+    let parameters = model.estimated_parameters();
+    let rated = || parameters.iter().filter(|p| p.verdict.is_some());
     let negligible = rated().filter(|p| p.is_negligible()).count();
     let count = |wanted| rated().filter(|p| p.verdict == Some(wanted)).count();
     let mut words = vec![format!(
@@ -66,6 +67,11 @@ fn off(value: f64, truth: Option<f64>, std: f64) -> Option<String> {
     off.is_finite().then(|| format!("{off:+.1}"))
 }
 
+/// Whether torques are computed with other values than the estimates.
+pub fn differs_in_use(parameters: &[Parameter]) -> bool {
+    parameters.iter().any(|p| p.in_use() != p.value)
+}
+
 fn joint(p: &Parameter) -> &str {
     p.joint.as_deref().unwrap_or("")
 }
@@ -97,8 +103,8 @@ pub fn beside_truth(all: &[Parameter], truth: TrueValue) -> Table {
 /// The section of a page.
 pub fn section(page: &mut Writer, model: &ModelFile, truth: TrueValue) {
     page.heading("Parameters");
-    intervals(page, model);
-    let all = &model.parameters;
+    let all = &model.estimated_parameters();
+    intervals(page, model, all);
     let std = |p: &Parameter| p.std.unwrap_or(f64::NAN);
     let below_zero = |p: &Parameter| p.is_below_zero() && !is_open(p);
     // theta_1 needs no column that says 1
@@ -121,6 +127,9 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: TrueValue) {
         .words("relative std", |p| match is_open(p) {
             true => number::ABSENT.to_owned(),
             false => number::percent(std(p) / p.value.abs()),
+        })
+        .when(differs_in_use(all), |t| {
+            t.numbers("in use", |p| number::value_and_std(p.in_use(), std(p)).0)
         })
         .when(all.iter().any(|p| truth(p).is_some()), |t| {
             t.words("truth", |p| {
@@ -145,7 +154,7 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: TrueValue) {
              computed with the nearest numbers that can exist, where the model holds them.",
         );
     }
-    effects(page, model);
+    page.table_if_any(effects_table(model));
 }
 
 /// Values of the parameters before the fit: by the masses of the robot file or its URDF, and where friction began.
@@ -180,9 +189,9 @@ fn before(model: &ModelFile) -> BTreeMap<String, f64> {
 }
 
 /// The intervals of all that the data show something of, beside the values before the fit.
-fn intervals(page: &mut Writer, model: &ModelFile) {
+fn intervals(page: &mut Writer, model: &ModelFile, parameters: &[Parameter]) {
     let before = before(model);
-    let shown = model.parameters.iter().filter(|p| !is_open(p));
+    let shown = parameters.iter().filter(|p| !is_open(p));
     let rows = shown.filter_map(|p| {
         let std = p.std.filter(|std| *std > 0.0)?;
         Some(IntervalRow {
@@ -207,19 +216,49 @@ fn intervals(page: &mut Writer, model: &ModelFile) {
     page.figures(figure.cells());
 }
 
-/// Effects that the model has beyond the declared structure.
-fn effects(page: &mut Writer, model: &ModelFile) {
-    let each = model.effects.iter();
-    let each = each.flat_map(|e| e.parameters.iter().map(move |(key, p)| (e, key, p)));
-    let columns = Columns::new("effects that were added to the declared model", each)
-        .words("effect", |(effect, ..)| &effect.name)
-        .words("joint", |(effect, ..)| {
-            effect.joint.as_deref().unwrap_or("")
+/// A number of an effect as a table shows it.
+struct EffectNumber<'a> {
+    effect: &'a str,
+    joint: Option<&'a str>,
+    key: &'a str,
+    /// What the data estimate, in `unit`.
+    estimate: f64,
+    std: Option<f64>,
+    /// What torques are computed with, in `unit`.
+    in_use: f64,
+    unit: &'a str,
+}
+
+/// Effects that the model has beyond the declared structure: what the data estimate, and what torques are computed with.
+pub fn effects_table(model: &ModelFile) -> Table {
+    let numbers = model.effects.iter().flat_map(|effect| {
+        let joint = effect.joint.as_deref();
+        effect.parameters.iter().map(move |(key, number)| {
+            let estimate = model.estimate(&format!("{} {key}", effect.name), joint);
+            EffectNumber {
+                effect: &effect.name,
+                joint,
+                key,
+                estimate: estimate.map_or(number.value, |estimate| estimate.value),
+                std: estimate.map_or(number.std, |estimate| estimate.std),
+                in_use: number.value,
+                unit: &number.unit,
+            }
         })
-        .words("parameter", |(_, key, _)| key)
-        .estimates(["value", "std"], |(.., p)| (p.value, p.std))
-        .words("unit", |(.., p)| &p.unit);
-    page.table_if_any(columns);
+    });
+    let numbers: Vec<EffectNumber> = numbers.collect();
+    let differs = numbers.iter().any(|n| n.in_use != n.estimate);
+    let std = |n: &EffectNumber| n.std.unwrap_or(f64::NAN);
+    Columns::new("effects that were added to the declared model", &numbers)
+        .words("effect", |n| n.effect)
+        .words("joint", |n| n.joint.unwrap_or(""))
+        .words("parameter", |n| n.key)
+        .estimates(["value", "std"], |n| (n.estimate, n.std))
+        .when(differs, |t| {
+            t.numbers("in use", |n| number::value_and_std(n.in_use, std(n)).0)
+        })
+        .words("unit", |n| n.unit)
+        .into()
 }
 
 #[cfg(test)]

@@ -98,7 +98,10 @@ pub fn identify(of: &IdentifyReport) -> Report {
     let mut detail = report.detail();
     detail.line("");
     detail.paragraph(&format!("{tally}."));
-    detail.table(parameters::beside_truth(&of.model().parameters, of.truth));
+    detail.table(parameters::beside_truth(
+        &of.model().estimated_parameters(),
+        of.truth,
+    ));
     detail.line("");
     quality_of_fit::condition(&mut detail, &found.dynamics);
     quality_of_fit::fit_quality(&mut detail, &found.dynamics);

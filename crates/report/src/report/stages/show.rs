@@ -140,10 +140,11 @@ fn range(to: &mut Writer, joints: &[JointInUse]) {
 
 /// Every parameter with its deviation and its value in use.
 fn parameters_table(terminal: &mut Writer, file: &ModelFile) {
-    let columns = Columns::new("parameters", &file.parameters)
+    let estimated = file.estimated_parameters();
+    let columns = Columns::new("parameters", &estimated)
         .words("parameter", |p| escape(&p.key()))
         .estimates(["value", "std"], |p| (p.value, p.std))
-        .when(file.is_consistent(), |t| {
+        .when(parameters::differs_in_use(&estimated), |t| {
             let std = |p: &Parameter| p.std.unwrap_or(f64::NAN);
             t.numbers("in use", |p| number::value_and_std(p.in_use(), std(p)).0)
         })
@@ -194,6 +195,7 @@ fn effects(terminal: &mut Writer, of: &ShowReport) {
     if !said.is_empty() {
         terminal.line("");
         terminal.paragraph(&format!("Effects: {}.", said.join("; ")));
+        terminal.table_apart(parameters::effects_table(of.file));
     }
 }
 
