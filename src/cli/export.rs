@@ -441,7 +441,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(path) = &args.python {
         let text = gravity_in_python(&model.robot, &model.theta, &base_lines).ok_or_else(|| {
             CliError::input(format!(
-                "{}: links of this robot follow others or are not known",
+                "{}: --python cannot be written: links of this robot follow others or are not known",
                 given.name
             ))
             .hint("take gravity of --c or --rust")

@@ -46,9 +46,6 @@ pub struct Args {
     pub report: Option<PathBuf>,
     #[command(flatten)]
     pub setup: setup::SetupArgs,
-    /// Seed of the starting points
-    #[arg(hide_short_help = true, long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {

@@ -20,11 +20,16 @@ const COMMANDS: [(&str, &str); 4] = [
 ];
 
 /// Options by their command.
-const OPTIONS: [(&[&str], &str, &str); 7] = [
+const OPTIONS: [(&[&str], &str, &str); 8] = [
     (
         &["lsq", "fit"],
         "--feasible",
         "leave it out: physically consistent parameters are always there (`--unconstrained`: not)",
+    ),
+    (
+        &["friction"],
+        "--seed",
+        "leave it out: the search begins at the same points each time",
     ),
     (
         &["diagnose"],

@@ -12,6 +12,22 @@ use super::{ExportedModel, WrittenFile, stem};
 /// Writes what was asked for of a tool's file.
 pub(super) fn run(args: &Args, text: &str, context: &Context) -> Result<Outcome, CliError> {
     let shown = escape(&args.model.to_string_lossy());
+    let others = [
+        ("--python", args.python.is_some()),
+        ("--urdf", args.urdf.is_some()),
+        ("--mjcf", args.mjcf.is_some()),
+        ("--sdf", args.sdf.is_some()),
+        ("--usd", args.usd.is_some()),
+        ("--rust", args.rust.is_some()),
+        ("--ros2-control", args.ros2_control.is_some()),
+        ("--observer", args.observer.is_some()),
+        ("--without-effects", args.without_effects),
+        ("LOG", !args.logs.is_empty()),
+    ];
+    if let Some((option, _)) = others.into_iter().find(|(_, given)| *given) {
+        let text = format!("{option} takes a model of a robot, and {shown} is a tool's file");
+        return Err(CliError::usage(text).hint("a tool's file goes with --controller and --c"));
+    }
     let file = ToolFile::parse(&shown, text).map_err(failed)?;
     let name = file_name(&args.model);
     let provenance = Provenance::of_text(&name, text);
