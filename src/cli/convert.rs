@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{
-    CliError, Context, Outcome, arguments, columns, columns_of, logs_of, names_of, paths_of,
-};
+use super::{CliError, Context, Outcome, arguments, columns, columns_of, names_of, paths_of};
 use cft_ident_core::number;
 use cft_ident_logs::log::{
     Block, Instant, JointTemperatures, Layout, LogSection, LogSpec, Provenance, RawBlock,
@@ -15,7 +13,7 @@ use cft_ident_logs::log::{
 };
 use cft_ident_logs::output::{LogForm, LogWriter};
 use cft_ident_report::report::json::JsonDocument;
-use cft_ident_stages::identify::{RobotSetup, repeated_rows};
+use cft_ident_stages::identify::{RobotSetup, repeated_files};
 
 const EXAMPLE: &str = "\
 Example:
@@ -246,7 +244,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let file = setup.as_ref().map(|setup| &setup.file);
     let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
     let (layout, mut provenance) = (file.map(|file| file.layout()), Vec::new());
-    let repeated = repeated_rows(&logs_of(&args.logs), layout.as_ref());
+    let repeated = repeated_files(&args.logs, layout.as_ref());
     warnings.extend(repeated.iter().map(ToString::to_string));
     for spec in &args.logs {
         provenance.push(match &setup {

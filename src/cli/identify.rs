@@ -195,7 +195,7 @@ impl IdentifyJob {
                 RobotSetup::new(&robot.to_string_lossy(), found.file)
             }
         };
-        identify::check_moving(&Dataset::read(&setup, &logs_of(all), &context.control)?.logs)?;
+        Dataset::read(&setup, &logs_of(all), &context.control)?.check_moving()?;
         let logs = held_out::parted(all);
         if logs.validation.is_empty() {
             let text =
@@ -294,10 +294,9 @@ fn execute(
     let setup = known.setup.clone();
     let read = |logs: &[Log]| LogData::read_all(&setup, logs, &[&known.logs], &context.control);
     let data = Dataset {
-        setup: setup.clone(),
-        logs: read(&fitted_logs)?,
         one_joint: read(&of_friction)?,
         held_out: read(&logs_of(&unseen))?,
+        ..Dataset::new(&setup, &read(&fitted_logs)?)
     };
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,

@@ -18,7 +18,7 @@ use cft_ident_logs::log::{
 use cft_ident_report::report::ReportDetail;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{Dataset, IdentifyError, LogData, RobotSetup, repeated_rows};
+use cft_ident_stages::identify::{Dataset, IdentifyError, LogData, RobotSetup, repeated_files};
 use cft_ident_stages::setup::{Finding, SetupReport};
 
 const EXAMPLE: &str = "\
@@ -267,7 +267,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let file = known.as_ref().map(|known| &known.setup.file);
     let mut warnings = file.map_or(Vec::new(), |file| file.notes.0.clone());
     let layout = file.map(|file| file.layout());
-    let repeated = repeated_rows(&logs_of(&args.logs), layout.as_ref());
+    let repeated = repeated_files(&args.logs, layout.as_ref());
     warnings.extend(repeated.iter().map(ToString::to_string));
     for spec in &args.logs {
         // What several machines recorded is no one log: each is looked at on its own.

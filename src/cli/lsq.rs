@@ -96,7 +96,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         &logs(&args.leave_out.of(&args.logs))?,
         &context.control,
     )?;
-    identify::check_moving(&data.logs)?;
+    data.check_moving()?;
     let (data, gains, edits) = match &args.fit_gains {
         None => (data, None, Vec::new()),
         Some(payload) => {
@@ -138,9 +138,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
         let smoothed = machine.smoothed_as(&found.position_cutoffs);
-        let in_memory = match logs.iter().any(|log| log.reduced().is_some()) {
-            true => None,
-            false => pictures::in_memory(&smoothed, logs, context)?,
+        let in_memory = match data.reduced.is_empty() {
+            false => None,
+            true => pictures::in_memory(&smoothed, logs, context)?,
         };
         let numbers = refined(&model, &args.output.to_string_lossy())?;
         let of_model = (&model, &numbers);

@@ -3,14 +3,15 @@
 use crate::find::diagnose::{DiagnoseEnd, DiagnoseSettings, diagnose};
 use crate::fit::dynamics::IdentifiedDynamics;
 use crate::fit::friction::{FrictionSettings, IdentifiedFriction, friction};
-use crate::fit::lsq::{LsqSettings, lsq};
+use crate::fit::lsq::lsq;
+use crate::fit::lsq_problem::LsqSettings;
 use crate::held_out::validate::{ValidateSettings, Validated, validate};
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::error_kind::ErrorKind;
 use crate::input::model::new_model;
-use crate::input::repeated::{each_row_once, without_rows_of};
+use crate::input::repeated::{each_row_once, identities, without_rows_of};
 use crate::note::StageNote;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_files::config::ModelFile;
@@ -65,14 +66,15 @@ pub fn identify<E: From<IdentifyError>>(
     control: &Control,
     ended: &mut dyn FnMut(StageEnd) -> Result<(), E>,
 ) -> Result<Campaigned, E> {
+    data.check_rows()?;
     let setup = &data.setup;
     // a one-joint log may serve both fits, but no log of a fit the validation
-    let validation = ("validation", data.held_out.as_slice());
     for (role, fitted) in [
         ("friction", &data.one_joint),
         ("identification", &data.logs),
     ] {
-        each_row_once(setup, &[(role, fitted), validation])?;
+        let validation = ("validation", identities(&data.held_out));
+        each_row_once(&[(role, identities(fitted)), validation])?;
     }
     let (mut inputs, mut notes) = (Vec::new(), Vec::new());
     let mut keep = |from: &[Provenance], noted: &[StageNote], role: DataRole| {
@@ -114,7 +116,7 @@ pub fn identify<E: From<IdentifyError>>(
         keep(&found.inputs, &found.notes, DataRole::HeldOut);
         validated = Some(found);
     }
-    let one_joint = without_rows_of(setup, &data.one_joint, &data.logs);
+    let one_joint = without_rows_of(&data.one_joint, &data.logs);
     let train = [data.logs.as_slice(), &one_joint].concat();
     let roles = Dataset::new(setup, &train).with_held_out(&data.held_out);
     let diagnosed = diagnose(&roles, &DiagnoseSettings::of(&given), control);

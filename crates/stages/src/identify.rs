@@ -40,8 +40,10 @@ pub use crate::fit::friction::{
     FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
 };
 pub use crate::fit::gains::{CurrentGains, FittedGains, Gain, PayloadLog, fit_gains};
+pub use crate::fit::instrumental::SimulatedLoop;
 pub use crate::fit::known_friction::{FrictionOfFit, FrictionParameter};
-pub use crate::fit::lsq::{LsqSettings, lsq};
+pub use crate::fit::lsq::lsq;
+pub use crate::fit::lsq_problem::LsqSettings;
 pub use crate::fit::motion_fit::MotionFit;
 pub use crate::fit::payload::payload;
 pub use crate::fit::payload_result::{
@@ -71,15 +73,14 @@ pub use crate::input::gain_error::GainError;
 pub use crate::input::in_memory::{InMemory, read_whole};
 pub use crate::input::in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use crate::input::log::Log;
-pub use crate::input::log_data::{LogData, check_moving};
+pub use crate::input::log_data::LogData;
 pub use crate::input::model::{new_model, refined, refined_or_friction};
 pub use crate::input::open_log::OpenLog;
-pub use crate::input::passes::SimulatedLoop;
 pub use crate::input::position_cutoff::PositionCutoff;
 pub use crate::input::reduced::{
     FORMAT, FrictionGiven, MadeWith, ReducedError, ReducedLog, ReducedLogs, is_reduced,
 };
-pub use crate::input::repeated::{each_log_once, repeated_rows, used_for};
+pub use crate::input::repeated::{each_log_once, repeated_files, used_for};
 pub use crate::input::robot_setup::{RobotSetup, narrowed};
 pub use crate::input::track_error::TrackError;
 pub use crate::input::unknowns::FittedUnknown;

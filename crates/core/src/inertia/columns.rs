@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use crate::motion::{FilterSettings, MotionSample, rest};
 use crate::robot::Robot;
 use crate::robot::friction::{DoubleTanh, sign};
+use crate::robot::model::JointFriction;
 
 /// A linear term that belongs to one joint and is fitted with the inertias.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,6 +92,15 @@ pub struct RegressorColumns {
 pub const GRADIENT: usize = 5;
 
 impl RegressorColumns {
+    /// The friction of each joint; none where it is not known.
+    pub fn known_laws(&self) -> Vec<Option<JointFriction>> {
+        let law = |known: &KnownFriction| JointFriction::DoubleTanh(known.law);
+        self.known
+            .iter()
+            .map(|known| known.as_ref().map(law))
+            .collect()
+    }
+
     /// Rows in which a joint with friction rests, by the speed up to which it does [m/s or rad/s], inform no
     /// parameter; joints without friction never rest.
     pub fn rest_at(&mut self, speeds: Vec<f64>) {

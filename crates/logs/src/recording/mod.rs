@@ -9,8 +9,8 @@ pub use self::torque_course::TorqueCourse;
 use crate::inspect::speeds::SpeedMeter;
 use crate::inspect::{InspectionGate, RowCutter};
 use crate::log::{
-    Block, Instant, JointTemperatures, Layout, LogArrays, LogError, LogSpec, Reader, RowFault,
-    RowStore,
+    Block, Instant, JointTemperatures, Layout, LogArrays, LogError, LogSpec, Provenance, Reader,
+    RowFault, RowStore,
 };
 use cft_ident_core::motion::ZeroOrderHold;
 use cft_ident_core::robot::Robot;
@@ -267,6 +267,14 @@ impl Recording {
     /// A log that lacks a channel of them, or one that is no number.
     pub fn temperatures(&self) -> Result<&JointTemperatures, LogError> {
         self.temperatures.as_ref().map_err(LogError::clone)
+    }
+
+    /// Name, span and checksum of its log, by which its rows are known from others.
+    ///
+    /// # Errors
+    /// A file that can no longer be read.
+    pub fn identity(&self) -> Result<Provenance, LogError> {
+        self.rows.reader()?.provenance()
     }
 
     /// The layout that it turned out to have.

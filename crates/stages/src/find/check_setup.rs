@@ -145,8 +145,7 @@ fn sampled(
     let _work = control.begin("checking the set-up", None);
     let mut thinner = Thinner::new(n);
     let mut channels: Option<Channels> = None;
-    let whole = logs.iter().filter(|log| log.reduced().is_none());
-    for (index, log) in whole.enumerate() {
+    for (index, log) in logs.iter().enumerate() {
         let mut open = log.open(control)?;
         let of_log = channels_of(setup, log, open.layout());
         if of_log.drive == Drive::Motors {
@@ -210,7 +209,7 @@ fn checked(
 /// The channels of a log as the robot file declares them.
 fn channels_of(setup: &RobotSetup, log: &LogData, layout: &Layout) -> Channels {
     let n = setup.robot.joints();
-    if matches!(log.source(), Log::Arrays(_)) {
+    if matches!(log.source, Log::Arrays(_)) {
         return Channels::of_joints(n);
     }
     let gears = setup.file.gear_matrix();

@@ -21,7 +21,7 @@ use crate::input::in_memory::{InMemory, read_each};
 use crate::input::log_data::LogData;
 use crate::input::model::{own_laws, refined};
 use crate::input::position_cutoff::known;
-use crate::input::repeated::{each_row_once, unseen_by};
+use crate::input::repeated::{each_row_once, identities, unseen_by};
 use crate::input::robot_setup::RobotSetup;
 use crate::input::temperatures;
 use crate::note::StageNote;
@@ -158,6 +158,7 @@ pub fn diagnose(
     settings: &DiagnoseSettings,
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
+    data.check_rows()?;
     let setup = &data.setup;
     let (name, as_given) = (settings.model.name.as_str(), &settings.model.file);
     // what is looked for stands beside the plain fit
@@ -176,7 +177,8 @@ pub fn diagnose(
     if let Some(fault) = without_gains(setup).or(refused(&data.logs)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
-    each_row_once(setup, &[("fit", &data.logs), ("holdout", &data.held_out)])?;
+    let holdout = ("holdout", identities(&data.held_out));
+    each_row_once(&[("fit", identities(&data.logs)), holdout])?;
     let groups = [
         (&data.logs, LogRole::Train),
         (&data.held_out, LogRole::Holdout),
@@ -336,7 +338,7 @@ fn without_gains(setup: &RobotSetup) -> Option<DataFault> {
 /// The first fault for which a fit refuses one of the logs.
 fn refused(logs: &[LogData]) -> Result<Option<DataFault>, IdentifyError> {
     for log in logs {
-        if let Some(fault) = log.recording()?.inspection.refusal().cloned() {
+        if let Some(fault) = log.recording().inspection.refusal().cloned() {
             return Ok(Some(DataFault {
                 kind: fault.kind.word().to_owned(),
                 channel: fault.channel,

@@ -4,17 +4,14 @@ use nalgebra::DMatrix;
 
 use super::dynamics::IdentifiedDynamics;
 use super::motion_fit::MotionFit;
-use crate::held_out::hold_out::{hold_out, or_note};
 use crate::held_out::residual::JointResidual;
 use crate::held_out::validate::{ValidateSettings, validate};
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_each;
-use crate::input::log_data::LogData;
 use crate::input::model::{in_file, refined};
 use crate::input::position_cutoff::known;
-use crate::input::reduced::error::ReducedError;
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{FitNote, StageNote};
 use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
@@ -31,20 +28,16 @@ const MIN_WINDOWS_PER_NUMBER: f64 = 4.0;
 
 /// Refines what `lsq` found by the motion that the torques make; without a window, blocks set aside choose it.
 pub(crate) fn by_motion(
-    setup: &RobotSetup,
+    data: &Dataset,
     found: &mut IdentifiedDynamics,
-    logs: &[LogData],
     window: Option<f64>,
     control: &Control,
 ) -> Result<(), IdentifyError> {
-    if let Some(part) = logs.iter().find_map(LogData::reduced) {
-        return Err(ReducedError::NeedsLog {
-            log: part.name().to_owned(),
-            what: "the motion that --open-loop simulates".to_owned(),
-            remedy: "give the log itself",
-        }
-        .into());
-    }
+    data.needs_rows(
+        "the motion that --open-loop simulates",
+        "give the log itself",
+    )?;
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
     let file = found.model(setup, None);
     let start = refined(&file, &setup.name)?;
     let one_axis = setup.robot.joints() == 1;
@@ -80,25 +73,15 @@ pub(crate) fn by_motion(
     }
     take(found, &fit);
     let file = found.model(setup, None);
-    let model = refined(&file, &setup.name)?;
-    let data = Dataset::new(setup, logs);
     let given = GivenModel::new(&setup.name, file);
-    let errors = validate(
-        &data,
-        &ValidateSettings::of(&given),
-        control,
-        &mut |_, _| {},
-    )?;
+    let errors = validate(data, &ValidateSettings::of(&given), control, &mut |_, _| {})?;
     let errors = errors.validation.errors.joints.into_iter();
     for (j, (joint, error)) in found.joints.iter_mut().zip(errors).enumerate() {
         found.fit.residual_std[j] *= error.rmse / joint.rmse;
         *joint = JointResidual::of(error);
     }
     let file = found.model(setup, None);
-    let smoothed = setup.smoothed_as(&found.position_cutoffs);
-    let held = hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control);
-    found.held = or_note(held, &mut found.notes)?;
-    Ok(())
+    found.set_blocks_aside(data, &file, control)
 }
 
 /// Puts the numbers of a fit to the motion in place of those of least squares.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::estimate::InertialEstimate;
 use crate::input::error::IdentifyError;
 use crate::input::robot_setup::RobotSetup;
-use crate::note::{FitNote, StageNote};
+use crate::note::FitNote;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::inertia::feasible::{
     ConsistencyProblem, FeasibleParameters, FrictionColumns, PRIOR_WEIGHT, feasible,
@@ -164,8 +164,19 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
     each.filter_map(of).collect()
 }
 
-/// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached.
+/// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached. None where the
+/// search failed or left the finite.
 pub(crate) fn consistent(
+    setup: &RobotSetup,
+    estimated: &InertialEstimate,
+    fastest: &[f64],
+) -> Option<ConsistentLinks> {
+    let found = nearest_consistent(setup, estimated, fastest).ok()?;
+    let numbers = found.values.iter().chain(&found.growth);
+    numbers.clone().all(|x| x.is_finite()).then_some(found)
+}
+
+fn nearest_consistent(
     setup: &RobotSetup,
     estimated: &InertialEstimate,
     fastest: &[f64],
@@ -219,19 +230,6 @@ pub(crate) fn consistent(
         values: (&found.theta + &basis.shift).iter().copied().collect(),
         growth,
     })
-}
-
-/// What was found; where the search failed or left the finite the plain fit stands alone, and a note says so.
-pub(crate) fn or_plain_fit(
-    found: Result<ConsistentLinks, IdentifyError>,
-    notes: &mut Vec<StageNote>,
-) -> Option<ConsistentLinks> {
-    let finite = |of: &ConsistentLinks| of.values.iter().chain(&of.growth).all(|x| x.is_finite());
-    let found = found.ok().filter(finite);
-    if found.is_none() {
-        notes.push(StageNote::Fit(FitNote::NotConsistent));
-    }
-    found
 }
 
 impl ConsistentLinks {

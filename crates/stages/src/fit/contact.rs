@@ -1,16 +1,18 @@
 //! Stretches in which something pushes the robot, and rows that a fit hangs on.
 
+use super::judged_estimate::JudgedEstimate;
+use super::lsq_problem::LsqProblem;
 use crate::input::control::Control;
+use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::log_data::{LogData, bridges};
-use crate::input::passes::{LogPasses, PositionFilter};
+use crate::input::lsq_rows::{LsqRows, PositionReading};
+use crate::input::position_cutoff::choose_smoothing;
 use crate::input::robot_setup::RobotSetup;
-use crate::input::unknowns::{FittedUnknown, columns};
+use crate::input::unknowns::columns;
 use crate::note::{FitNote, NumberWithStd, StageNote};
-use cft_ident_core::inertia::accumulate::BlockFactors;
-use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::jumps::ResidualJump;
-use cft_ident_core::inertia::solve::{RowWeighting, fit};
+use cft_ident_core::inertia::solve::{Fit, RowWeighting, fit};
 use cft_ident_files::config::robot_file::FrictionLawKind;
 use cft_ident_logs::log::{RowFault, escape};
 
@@ -26,25 +28,22 @@ pub(crate) fn contacts(
     control: &Control,
 ) -> Result<Vec<StageNote>, IdentifyError> {
     let linear = setup.file.friction_law() != FrictionLawKind::DoubleTanh;
-    if !linear || setup.robot.joints() < 2 || logs.iter().any(|log| log.reduced().is_some()) {
+    if !linear || setup.robot.joints() < 2 {
         return Ok(Vec::new());
     }
-    let own = setup.own_settings(logs, &[], control)?;
-    let mut passes = LogPasses::new(setup, logs, control).each_by_itself(own);
-    passes.read(PositionFilter::Declared, &columns(setup, None), None)?;
-    passes.contacts()
+    let data = Dataset::new(setup, logs);
+    let mut rows = LsqRows::new(&data, choose_smoothing(&data, &[], control)?, control);
+    rows.fold(PositionReading::Declared, &columns(setup, None), None)?;
+    contacts_in(&rows)
 }
 
-impl LogPasses<'_> {
-    /// The stretches that the first reading found, one note each.
-    pub(crate) fn contacts(&self) -> Result<Vec<StageNote>, IdentifyError> {
-        let noted = |(log, jump): &(usize, ResidualJump)| {
-            let log = &self.logs[*log];
-            let first = log.first_row()?;
-            Ok(StageNote::Fit(contact(self.setup, log, jump, first)))
-        };
-        self.jumps.iter().map(noted).collect()
-    }
+/// The stretches that were seen as rows were folded for the first time, one note each.
+pub(crate) fn contacts_in(rows: &LsqRows) -> Result<Vec<StageNote>, IdentifyError> {
+    let noted = |(log, jump): (&LogData, &ResidualJump)| {
+        let first = log.first_row()?;
+        Ok(StageNote::Fit(contact(rows.setup, log, jump, first)))
+    };
+    rows.jumps().into_iter().map(noted).collect()
 }
 
 /// `first` is the time of the first row that is read, as the rows have it [s].
@@ -61,43 +60,38 @@ fn contact(setup: &RobotSetup, log: &LogData, jump: &ResidualJump, first: f64) -
     }
 }
 
-/// What a fit says with the rows that were bridged as they were logged, where that is another thing.
-pub(crate) fn hangs_on_bridged(
-    setup: &RobotSetup,
-    logs: &[LogData],
-    (linear, rows): (&RegressorColumns, &BlockFactors),
-    unknowns: &[FittedUnknown],
+/// Parameters that a linear fit of logs finds elsewhere where spikes stay as they were logged.
+pub(crate) fn moved_by_bridges(
+    problem: &LsqProblem,
+    judged: &JudgedEstimate,
     control: &Control,
 ) -> Result<Option<FitNote>, IdentifyError> {
-    if !bridges(logs)? {
+    if !problem.is_linear() || !bridges(&problem.data.logs)? {
         return Ok(None);
     }
-    let kept = setup.keeping(RowFault::Spike);
-    let logs = logs.iter().map(|log| log.read_again(&kept, control));
-    let logs = &logs.collect::<Result<Vec<_>, _>>()?;
-    let own = kept.own_settings(logs, &[], control)?;
-    let mut passes = LogPasses::new(&kept, logs, control).each_by_itself(own);
-    let as_logged = passes.read(PositionFilter::Declared, linear, None)?;
-    let (Ok(now), Ok(other)) = (
-        fit(rows, RowWeighting::Wls),
-        fit(&as_logged, RowWeighting::Wls),
-    ) else {
+    let kept = problem.data.setup.keeping(RowFault::Spike);
+    let data = Dataset::new(&problem.data.setup, &problem.data.logs).of_robot(kept, control)?;
+    let mut kept = LsqRows::new(&data, choose_smoothing(&data, &[], control)?, control);
+    let as_logged = kept.fold(PositionReading::Declared, &problem.columns, None)?;
+    let bridged = fit(&judged.estimate.basis.sums, RowWeighting::Wls);
+    let (Ok(bridged), Ok(as_logged)) = (bridged, fit(&as_logged, RowWeighting::Wls)) else {
         return Ok(None);
     };
-    let moved = unknowns.iter().enumerate().filter_map(|(i, unknown)| {
-        let std =
-            |fit: &cft_ident_core::inertia::solve::Fit| fit.covariance[(i, i)].max(0.0).sqrt();
-        let (a, b) = (now.theta.get(i)?, other.theta.get(i)?);
-        let both = std(&now).hypot(std(&other));
-        let known = now.determined[i] && other.determined[i];
-        (known && (a - b).abs() > MOVED_DEVIATIONS * both).then(|| {
-            let [a, b] = [(a, &now), (b, &other)].map(|(value, fit)| NumberWithStd {
-                value: *value,
-                std: std(fit),
-            });
-            (unknown.key.clone(), [a, b])
+    let number = |fit: &Fit, i: usize| {
+        Some(NumberWithStd {
+            value: *fit.theta.get(i).filter(|_| fit.determined[i])?,
+            std: fit.covariance[(i, i)].max(0.0).sqrt(),
         })
-    });
+    };
+    let moved = judged
+        .unknowns
+        .iter()
+        .enumerate()
+        .filter_map(|(i, unknown)| {
+            let (a, b) = (number(&bridged, i)?, number(&as_logged, i)?);
+            let far = (a.value - b.value).abs() > MOVED_DEVIATIONS * a.std.hypot(b.std);
+            far.then(|| (unknown.key.clone(), [a, b]))
+        });
     let moved: Vec<_> = moved.collect();
     Ok((!moved.is_empty()).then_some(FitNote::HangsOnBridged { moved }))
 }

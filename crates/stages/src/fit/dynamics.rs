@@ -7,12 +7,18 @@ use serde::Serialize;
 use super::consistent::ConsistentLinks;
 use super::estimate::EstimatorAccount;
 use super::gains::{Gain, LSQ_WITH_GAINS};
+use super::judged_estimate::JudgedEstimate;
 use super::known_friction::FrictionOfFit;
+use super::lsq_problem::LsqProblem;
 use super::motion_fit::MotionFit;
-use super::weakest::WeakestPart;
-use crate::held_out::hold_out::Held;
+use super::weakest::{WeakestPart, weakest};
+use crate::held_out::hold_out::{Held, hold_out, or_note};
 use crate::held_out::residual::{JointResidual, RelativeError};
-use crate::input::model::new_model;
+use crate::input::control::Control;
+use crate::input::dataset::Dataset;
+use crate::input::error::IdentifyError;
+use crate::input::lsq_rows::LsqRows;
+use crate::input::model::{new_model, refined};
 use crate::input::position_cutoff::PositionCutoff;
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
@@ -98,6 +104,78 @@ pub struct EssentialFit {
 }
 
 impl IdentifiedDynamics {
+    /// What a judged estimate found, before anything is said of it on logs.
+    pub(crate) fn new(
+        problem: &LsqProblem,
+        rows: &LsqRows,
+        judged: JudgedEstimate,
+        notes: Vec<StageNote>,
+    ) -> Result<Self, IdentifyError> {
+        let (setup, gains) = (&problem.data.setup, problem.settings.gains);
+        let unconstrained = match &judged.consistent {
+            Some(of) if of.in_use => RelativeError::each(setup, &judged.plain_errors()),
+            _ => Vec::new(),
+        };
+        let (count, errors) = judged.essential;
+        let estimate = judged.estimate;
+        let fit = estimate.fit;
+        let mut inputs = rows.inputs();
+        let known = problem.before.as_ref().zip(problem.friction_file());
+        let friction_prior = known.map(|(before, file)| before.kept(file, &inputs));
+        // what a fit has among its unknowns is no friction beside them
+        let beside = estimate.columns.known.iter().any(Option::is_some);
+        let friction = known
+            .filter(|_| beside)
+            .map(|(before, _)| before.after(setup, &estimate.columns, &estimate.covariance));
+        inputs.extend(gains.iter().flat_map(|gains| gains.inputs.clone()));
+        Ok(IdentifiedDynamics {
+            friction: friction.unwrap_or_default(),
+            gains: gains.map_or(Vec::new(), |gains| gains.joints.clone()),
+            essential: EssentialFit {
+                count,
+                joints: RelativeError::each(setup, &errors),
+            },
+            condition: fit.condition,
+            rank: fit.rank,
+            weakest_direction: weakest(&fit, &judged.unknowns),
+            samples: fit.rows * setup.robot.joints() as u64,
+            effective_samples: fit.effective_rows * setup.robot.joints() as f64,
+            joints: Vec::new(),
+            unconstrained_residual: unconstrained,
+            by_motion: None,
+            position_cutoffs: judged.position_cutoffs,
+            account: estimate.account,
+            summary: rows.summary().cloned().ok_or(IdentifyError::NoLog)?,
+            setup: judged.geometry,
+            columns: estimate.columns,
+            covariance: estimate.covariance,
+            friction_prior: friction_prior.unwrap_or_default(),
+            held: Held::default(),
+            consistent: judged.consistent,
+            unknowns: judged.unknowns,
+            fit,
+            inputs,
+            notes,
+        })
+    }
+
+    /// Sets blocks of the logs aside, one after the other, and keeps what the model `file` leaves of them.
+    pub(crate) fn set_blocks_aside(
+        &mut self,
+        data: &Dataset,
+        file: &ModelFile,
+        control: &Control,
+    ) -> Result<(), IdentifyError> {
+        let smoothed = data.setup.smoothed_as(&self.position_cutoffs);
+        let model = refined(file, &data.setup.name);
+        let held = model.and_then(|model| {
+            let logs = (data.logs.as_slice(), self.inputs.as_slice());
+            hold_out(&smoothed, (file, &model), logs, control)
+        });
+        self.held = or_note(held, &mut self.notes)?;
+        Ok(())
+    }
+
     /// The model: friction as it was known, and what was fitted, with their joint covariance.
     pub fn model(&self, setup: &RobotSetup, friction: Option<&ModelFile>) -> ModelFile {
         let command = if self.gains.is_empty() {

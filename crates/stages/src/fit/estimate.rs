@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::instrumental::{SimulatedLoop, fold_instruments};
 use super::known_friction::{of_joint, of_refinement, with_friction};
 use crate::input::error::IdentifyError;
-use crate::input::passes::{LogPasses, PositionFilter, SimulatedLoop};
+use crate::input::lsq_rows::{LsqRows, PositionReading};
 use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
 use cft_ident_core::inertia::add_processing;
@@ -163,7 +164,7 @@ type PlainEstimate = (Fit, FitRows, Solver);
 /// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
 /// (18), which is then refined.
 pub fn estimate(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     columns: RegressorColumns,
     estimator: EstimatorKind,
     law: bool,
@@ -174,7 +175,7 @@ pub fn estimate(
     let holds = !moves && columns.known.iter().any(Option::is_some);
     let mut columns = columns;
     if moves && estimator != EstimatorKind::Oe {
-        let found = with_known_friction(passes, columns, shown)?;
+        let found = with_known_friction(rows, columns, shown)?;
         if estimator == EstimatorKind::Wls {
             return Ok(InertialEstimate { account, ..found });
         }
@@ -183,21 +184,21 @@ pub fn estimate(
     }
     let (mut fit, mut basis, solver) = match estimator {
         // nothing of a law that is held is left to search: its fit is linear
-        EstimatorKind::Oe if holds => linear(passes, &columns, solve::RowWeighting::Wls)?,
-        EstimatorKind::Oe => refined(passes, &columns, law, shown)?,
-        EstimatorKind::Wls if law => refined(passes, &columns, law, shown)?,
+        EstimatorKind::Oe if holds => linear(rows, &columns, solve::RowWeighting::Wls)?,
+        EstimatorKind::Oe => refined(rows, &columns, law, shown)?,
+        EstimatorKind::Wls if law => refined(rows, &columns, law, shown)?,
         EstimatorKind::Irls => {
-            first_reading(passes, &columns)?;
-            robust_regression(passes, &columns, shown)?
+            first_reading(rows, &columns)?;
+            robust_regression(rows, &columns, shown)?
         }
         EstimatorKind::Iv => {
-            first_reading(passes, &columns)?;
-            instrumental(passes, &columns, shown)?
+            first_reading(rows, &columns)?;
+            instrumental(rows, &columns, shown)?
         }
-        EstimatorKind::Ols => linear(passes, &columns, solve::RowWeighting::Ols)?,
-        EstimatorKind::Wls => linear(passes, &columns, solve::RowWeighting::Wls)?,
+        EstimatorKind::Ols => linear(rows, &columns, solve::RowWeighting::Ols)?,
+        EstimatorKind::Wls => linear(rows, &columns, solve::RowWeighting::Wls)?,
     };
-    let bias = widen(passes, &columns, &solver, &mut fit)?;
+    let bias = widen(rows, &columns, &solver, &mut fit)?;
     departure::widen_by_departure(&basis.sums, &mut fit);
     let columns = match &solver {
         Solver::Refined(refined) => {
@@ -218,11 +219,11 @@ pub fn estimate(
 
 /// Refines the known friction with the inertias, drawn to it by its covariance; the fit left is of the inertias.
 fn with_known_friction(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     mut columns: RegressorColumns,
     account: &mut EstimatorAccount,
 ) -> Result<InertialEstimate, IdentifyError> {
-    let refined = refinement(passes, columns.clone(), account)?;
+    let refined = refinement(rows, columns.clone(), account)?;
     let (mut fit, sums) = refined.without_laws()?;
     let (laws, free) = (
         refined.columns.known.clone(),
@@ -230,7 +231,7 @@ fn with_known_friction(
     );
     let mut whole = refined.fit.clone();
     widen(
-        passes,
+        rows,
         &columns,
         &Solver::Refined(Box::new(refined)),
         &mut whole,
@@ -258,11 +259,11 @@ fn with_known_friction(
 
 /// Linear least squares, rows weighted or alike.
 fn linear(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     columns: &RegressorColumns,
     estimator: solve::RowWeighting,
 ) -> Result<PlainEstimate, IdentifyError> {
-    let sums = first_reading(passes, columns)?;
+    let sums = first_reading(rows, columns)?;
     let found = fit(&sums, estimator)?;
     let basis = FitRows {
         parts: sums.in_parts(),
@@ -273,43 +274,43 @@ fn linear(
 
 /// Rows as the robot file says, with samples at standstill where they count.
 fn first_reading(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     columns: &RegressorColumns,
 ) -> Result<BlockFactors, IdentifyError> {
-    let sums = passes.read(PositionFilter::Declared, columns, None)?;
-    if passes.plain {
+    let sums = rows.fold(PositionReading::Declared, columns, None)?;
+    if !rows.weighs_rests {
         return Ok(sums);
     }
     let without = fit(&sums, solve::RowWeighting::Wls)?;
     let open = standstill::open_joints(columns, &without);
-    if open.is_empty() || !passes.count_rests(&open) {
+    if open.is_empty() || !rows.count_rests(&open) {
         return Ok(sums);
     }
-    let all = passes.read(PositionFilter::Declared, columns, None)?;
+    let all = rows.fold(PositionReading::Declared, columns, None)?;
     let with = fit(&all, solve::RowWeighting::Wls)?;
     let counted = standstill::counted(columns, open.clone(), [&without, &with]);
-    passes.count_rests(&counted);
+    rows.count_rests(&counted);
     match counted.len() {
         0 => Ok(sums),
         n if n == open.len() => Ok(all),
-        _ => passes.read(PositionFilter::Declared, columns, None),
+        _ => rows.fold(PositionReading::Declared, columns, None),
     }
 }
 
 /// The slopes of the friction law with all else.
 fn refined(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     columns: &RegressorColumns,
     law: bool,
     account: &mut EstimatorAccount,
 ) -> Result<PlainEstimate, IdentifyError> {
     let start = match law {
         true => law_start::begin(columns, &mut |columns| {
-            passes.read(PositionFilter::Declared, columns, None)
+            rows.fold(PositionReading::Declared, columns, None)
         })?,
         false => columns.clone(),
     };
-    let refined = refinement(passes, start, account)?;
+    let refined = refinement(rows, start, account)?;
     let basis = FitRows::in_one_block(&refined.factors, refined.fit.theta.len());
     Ok((
         refined.fit.clone(),
@@ -320,18 +321,18 @@ fn refined(
 
 /// The refinement from a law of every joint.
 fn refinement(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     start: RegressorColumns,
     account: &mut EstimatorAccount,
 ) -> Result<RefinedFit, IdentifyError> {
-    passes.work.doing("friction law");
+    rows.work.doing("friction law");
     let refined = refine::refine(start, &mut |columns| {
-        passes.read(PositionFilter::Declared, columns, None)
+        rows.fold(PositionReading::Declared, columns, None)
     })?;
     account.law_refined = refined.columns.known.iter().any(Option::is_some);
     account.status = refined.ending;
     account.iterations = refined.iterations;
-    account.record(passes.setup, |j| JointAccount {
+    account.record(rows.setup, |j| JointAccount {
         relative_error_before: Some(refined.before[j].all),
         ..JointAccount::default()
     });
@@ -340,11 +341,11 @@ fn refinement(
 
 /// Rows with large residuals count less.
 fn robust_regression(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     columns: &RegressorColumns,
     account: &mut EstimatorAccount,
 ) -> Result<PlainEstimate, IdentifyError> {
-    passes.work.doing("robust regression");
+    rows.work.doing("robust regression");
     let RobustFit {
         fit,
         factors: sums,
@@ -353,10 +354,10 @@ fn robust_regression(
         iterations,
         scale,
         down_weighted,
-    } = robust::irls(&mut |weigher| passes.read(PositionFilter::Declared, columns, weigher))?;
+    } = robust::irls(&mut |weigher| rows.fold(PositionReading::Declared, columns, weigher))?;
     account.status = status;
     account.iterations = iterations;
-    account.record(passes.setup, |j| JointAccount {
+    account.record(rows.setup, |j| JointAccount {
         scale: Some(scale[j]),
         down_weighted: Some(down_weighted[j]),
         ..JointAccount::default()
@@ -367,14 +368,14 @@ fn robust_regression(
 
 /// The regressor along simulated positions as instruments.
 fn instrumental(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     columns: &RegressorColumns,
     account: &mut EstimatorAccount,
 ) -> Result<PlainEstimate, IdentifyError> {
-    passes.work.doing("instrumental variables");
-    let sums = passes.read(PositionFilter::Declared, columns, None)?;
+    rows.work.doing("instrumental variables");
+    let sums = rows.fold(PositionReading::Declared, columns, None)?;
     let plain = fit(&sums, solve::RowWeighting::Wls)?;
-    let map = passes.setup.robot.standard_map();
+    let map = rows.setup.robot.standard_map();
     let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
     let effective = plain.effective_rows / plain.rows as f64;
     let mut simulate_by = plain.theta.clone();
@@ -385,12 +386,12 @@ fn instrumental(
     } = instruments::iterate(columns, &plain, &mut |theta| {
         simulate_by = nearest(&map, &whole, effective, theta)?;
         let (sums, simulated) =
-            passes.read_instruments(PositionFilter::Declared, columns, &simulate_by)?;
+            fold_instruments(rows, PositionReading::Declared, columns, &simulate_by)?;
         account.simulated = Some(simulated);
         Ok::<_, IdentifyError>(sums)
     })?;
     if let Some(SimulatedLoop { gains, .. }) = account.simulated.clone() {
-        account.record(passes.setup, |j| JointAccount {
+        account.record(rows.setup, |j| JointAccount {
             proportional: gains.proportional.get(j).copied(),
             derivative: gains.derivative.get(j).copied(),
             ..JointAccount::default()
@@ -406,41 +407,41 @@ fn instrumental(
 /// Adds to the uncertainty of a fit what a narrower position filter and the encoders' grid move; and what noise of the
 /// positions makes of it, where that is known.
 fn widen(
-    passes: &mut LogPasses,
+    rows: &mut LsqRows,
     columns: &RegressorColumns,
     solver: &Solver,
     fit: &mut Fit,
 ) -> Result<Option<DVector<f64>>, IdentifyError> {
-    passes.work.doing("uncertainty");
+    rows.work.doing("uncertainty");
     let read = solver.columns(columns);
     let mut weigher = solver.weigher();
     let again = match solver {
         Solver::Instrumental(found) => {
             let (found, simulated) = &**found;
-            let (sums, _) = passes.read_instruments(PositionFilter::Narrower, read, simulated)?;
+            let (sums, _) = fold_instruments(rows, PositionReading::Narrower, read, simulated)?;
             instruments::again(read, found, &sums)?
         }
-        Solver::Linear(_) if passes.have_torque_rates() => {
+        Solver::Linear(_) if rows.have_torque_rates() => {
             let rates = read.with_torque_rates();
-            let sums = passes.read(PositionFilter::Narrower, &rates, None)?;
-            late::widen_by_delay(&sums, passes.shortest_step(), fit);
+            let sums = rows.fold(PositionReading::Narrower, &rates, None)?;
+            late::widen_by_delay(&sums, rows.shortest_step(), fit);
             solver.solve(late::without_rates(&sums), None)?
         }
         _ => {
-            let sums = passes.read(PositionFilter::Narrower, read, weigher.as_mut())?;
+            let sums = rows.fold(PositionReading::Narrower, read, weigher.as_mut())?;
             solver.solve(sums, weigher.as_ref())?
         }
     };
     add_processing(fit, &again);
-    let grids = passes.setup.robot.transmission().encoder_steps();
+    let grids = rows.setup.robot.transmission().encoder_steps();
     let wls = matches!(solver, Solver::Linear(solve::RowWeighting::Wls));
     if grids.is_none() && !wls {
         return Ok(None);
     }
     let mut again = Vec::new();
-    for grid in 0..passes.readings_again() {
+    for grid in 0..rows.readings_again() {
         let mut weigher = solver.weigher();
-        if let Some(sums) = passes.read_shifted(read, grid, weigher.as_mut())? {
+        if let Some(sums) = rows.fold_again(grid, read, weigher.as_mut())? {
             again.push(solver.solve(sums, weigher.as_ref())?);
         }
     }

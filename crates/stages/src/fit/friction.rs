@@ -12,7 +12,7 @@ use crate::input::error::IdentifyError;
 use crate::input::log_data::LogData;
 use crate::input::model::new_model;
 use crate::input::one_joint::{self, OneJointLog};
-use crate::input::repeated::each_row_once;
+use crate::input::repeated::{each_row_once, identities};
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{FrictionNote, StageNote};
 use crate::setup::Finding;
@@ -150,7 +150,8 @@ pub fn friction(
 ) -> Result<IdentifiedFriction, IdentifyError> {
     let (setup, logs) = (&data.setup, data.logs.as_slice());
     setup.check_gains()?;
-    each_row_once(setup, &[("fit", logs)])?;
+    data.check_rows()?;
+    each_row_once(&[("fit", identities(logs))])?;
     let (groups, inputs, of_logs) = by_joint(setup, logs, settings, control)?;
     let mut notes: Vec<StageNote> = StageNote::of_robot(&setup.file).chain(of_logs).collect();
     let work = control.begin("friction filter", Some(groups.len() as u64));

@@ -10,7 +10,7 @@ use crate::input::error::IdentifyError;
 use crate::input::gain_error::GainError;
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
-use crate::input::passes::{LogPasses, PositionFilter};
+use crate::input::lsq_rows::{LsqRows, PositionReading};
 use crate::input::robot_setup::RobotSetup;
 use crate::input::setup_file::differences;
 use crate::input::unknowns::columns;
@@ -85,7 +85,7 @@ impl FittedGains {
         let scaled = |logs: &[LogData]| -> Result<Vec<LogData>, IdentifyError> {
             let logs = logs
                 .iter()
-                .map(|log| log.source().with_torques_times(&self.factors));
+                .map(|log| log.source.with_torques_times(&self.factors));
             let logs = logs.collect::<Result<Vec<Log>, _>>()?;
             LogData::read_all(&self.setup, &logs, &[], control)
         };
@@ -94,6 +94,7 @@ impl FittedGains {
             logs: scaled(&data.logs)?,
             one_joint: scaled(&data.one_joint)?,
             held_out: scaled(&data.held_out)?,
+            reduced: Vec::new(),
         })
     }
 }
@@ -109,6 +110,7 @@ pub fn fit_gains(
     control: &Control,
 ) -> Result<FittedGains, IdentifyError> {
     let (setup, logs) = (&data.setup, data.logs.as_slice());
+    data.check_rows()?;
     usable(setup, payload)?;
     let shape = payload
         .map(|_| PayloadColumns::of(&setup.robot))
@@ -121,13 +123,13 @@ pub fn fit_gains(
     let mut columns = columns(setup, None);
     columns.rest_at(setup.rest_speeds(&[logs, &loaded].concat())?);
     let mut reading = LoadReadings {
-        unloaded: LogPasses::new(setup, logs, control),
-        loaded: LogPasses::new(setup, &loaded, control),
+        unloaded: LsqRows::as_declared(setup, logs, control),
+        loaded: LsqRows::as_declared(setup, &loaded, control),
         columns,
         payload: shape,
     };
-    let fit = reading.fit(PositionFilter::Declared)?;
-    let narrow = reading.fit(PositionFilter::Narrower)?;
+    let fit = reading.fit(PositionReading::Declared)?;
+    let narrow = reading.fit(PositionReading::Narrower)?;
     let relative = covariance(&fit, &narrow, payload);
     judged(setup, &fit, &relative, payload)?;
     let n = setup.robot.joints();
@@ -149,14 +151,10 @@ pub fn fit_gains(
     Ok(FittedGains {
         gains: CurrentGains {
             joints: joints.map(gain).collect(),
-            notes: notes(
-                &fit,
-                reference.as_deref(),
-                std::mem::take(&mut reading.loaded.notes),
-            ),
+            notes: notes(&fit, reference.as_deref(), reading.loaded.notes()),
             reference,
             covariance: relative,
-            inputs: std::mem::take(&mut reading.loaded.inputs),
+            inputs: reading.loaded.inputs(),
         },
         edits: edits(&scaled.file, &setup.file),
         setup: scaled,
@@ -166,17 +164,17 @@ pub fn fit_gains(
 
 /// The two sets of logs, read once for each processing.
 struct LoadReadings<'a> {
-    unloaded: LogPasses<'a>,
-    loaded: LogPasses<'a>,
+    unloaded: LsqRows<'a>,
+    loaded: LsqRows<'a>,
     columns: RegressorColumns,
     payload: Option<PayloadColumns>,
 }
 
 impl LoadReadings<'_> {
-    fn fit(&mut self, filter: PositionFilter) -> Result<GainFit, IdentifyError> {
-        let unloaded = self.unloaded.read(filter, &self.columns, None)?;
+    fn fit(&mut self, reading: PositionReading) -> Result<GainFit, IdentifyError> {
+        let unloaded = self.unloaded.fold(reading, &self.columns, None)?;
         let loaded = match &self.payload {
-            Some(payload) => Some((self.loaded.read(filter, &self.columns, None)?, payload)),
+            Some(payload) => Some((self.loaded.fold(reading, &self.columns, None)?, payload)),
             None => None,
         };
         Ok(gains::fit_gains(&GainRows {

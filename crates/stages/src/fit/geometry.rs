@@ -57,6 +57,31 @@ impl NearRoundNumber {
             *place = self.plain;
         }
     }
+
+    /// With it made plain `fewer` parameters would be left; `largest` is the one that is least determined, in words.
+    fn finding(&self, file: &RobotFile, fewer: usize, largest: &str) -> Finding {
+        let joint = file.robot.link[self.link].joint.clone();
+        let name = joint.clone();
+        let name = name.unwrap_or_else(|| format!("link {}", self.link + 1));
+        let place = match self.key {
+            "xyz" | "rpy" => format!("{}[{}]", self.key, self.part),
+            key => key.to_owned(),
+        };
+        let (value, exact) = (self.declared, self.plain);
+        Finding::new(
+            FindingKind::Geometry,
+            joint,
+            [Setting::Number(value), Setting::Number(exact)],
+            format!(
+                "{place} of {name} is {value}, which is {:.1e} from {exact:.9}: with that {fewer} base parameter(s) fewer would be left, which these data cannot tell{largest}",
+                (value - exact).abs(),
+            ),
+            format!(
+                "{place} = {exact:?} in the row of {name} of the robot file or its URDF, unless it was measured so"
+            ),
+            false,
+        )
+    }
 }
 
 fn all_nearly(links: &[LinkSection]) -> Vec<NearRoundNumber> {
@@ -123,37 +148,6 @@ pub(crate) fn geometry(
             u.key, u.fitted, u.fitted_std, u.unit
         )
     });
-    let finding = |k: usize| {
-        let NearRoundNumber {
-            link,
-            key,
-            part,
-            declared: value,
-            plain: exact,
-        } = nearly[k];
-        let section = &file.robot.link[link];
-        let joint = section.joint.clone();
-        let name = joint
-            .clone()
-            .unwrap_or_else(|| format!("link {}", link + 1));
-        let place = match key {
-            "xyz" | "rpy" => format!("{key}[{part}]"),
-            _ => key.to_owned(),
-        };
-        Finding::new(
-            FindingKind::Geometry,
-            joint,
-            [Setting::Number(value), Setting::Number(exact)],
-            format!(
-                "{place} of {name} is {value}, which is {:.1e} from {exact:.9}: with that {} base parameter(s) fewer would be left, which these data cannot tell{largest}",
-                (value - exact).abs(),
-                declared - plain
-            ),
-            format!(
-                "{place} = {exact:?} in the row of {name} of the robot file or its URDF, unless it was measured so"
-            ),
-            false,
-        )
-    };
+    let finding = |k: usize| nearly[k].finding(file, declared - plain, &largest);
     named.into_iter().map(finding).collect()
 }

@@ -6,8 +6,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 use crate::input::control::Control;
+use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
-use crate::input::log_data::LogData;
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{FrictionNote, StageNote};
 use cft_ident_core::friction::estimate::curve_std;
@@ -65,30 +65,30 @@ fn any_shared(a: &[Provenance], b: &[Provenance]) -> bool {
 }
 
 impl FrictionBefore {
-    /// What the model `file`, called `name`, knows of the friction before `logs` are fitted: its own values, or where
+    /// What the model `file`, called `name`, knows of the friction before the logs are fitted: its own values, or where
     /// these logs made them those of before. With `hold` they are the file's own, and a fit moves none of them.
     ///
     /// # Errors
     /// A model without a joint's friction, and logs that cannot be read.
     pub fn of(
-        setup: &RobotSetup,
+        data: &Dataset,
         (name, file): (&str, &ModelFile),
-        logs: &[LogData],
         (estimator, hold): (EstimatorKind, bool),
         control: &Control,
     ) -> Result<Self, IdentifyError> {
-        let known = logs.iter().filter(|_| !hold);
-        let known = known.map(|log| match log {
-            LogData::Reduced(part) => Ok(part.provenance.clone()),
-            log => log.open(control)?.provenance(),
-        });
-        let given = known.collect::<Result<Vec<_>, _>>()?;
+        let mut given = Vec::new();
+        if !hold {
+            given.extend(data.reduced.iter().map(|part| part.provenance.clone()));
+            for log in &data.logs {
+                given.push(log.open(control)?.provenance()?);
+            }
+        }
         let mut before = FrictionBefore {
             known: Vec::new(),
             priors: Vec::new(),
             left_out: Vec::new(),
         };
-        for joint in setup.robot.joint_names() {
+        for joint in data.setup.robot.joint_names() {
             let prior = prior_of((name, file), joint, &given)?;
             let law = file.double_tanh(name, joint)?;
             let (values, mut covariance) = (

@@ -1,9 +1,15 @@
 //! What is noticed of a fit.
 
-use super::estimate::EstimatorAccount;
+use super::consistent::ConsistentLinks;
+use super::contact::contacts_in;
+use super::estimate::{EstimatorAccount, InertialEstimate};
+use super::judged_estimate::JudgedEstimate;
+use super::lsq_problem::LsqProblem;
+use crate::input::error::IdentifyError;
+use crate::input::lsq_rows::LsqRows;
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
-use crate::note::{FitNote, NumberWithStd};
+use crate::note::{FitNote, NumberWithStd, StageNote};
 use cft_ident_core::inertia::instruments::ReferenceSource;
 use cft_ident_core::inertia::solution::ConfoundedUnknowns;
 use cft_ident_core::inertia::solve::Fit;
@@ -13,6 +19,65 @@ use cft_ident_files::config::model_file::is_positive;
 
 /// Unknowns of a combination that are named.
 const NAMED_TERMS: usize = 6;
+
+/// All of a fit, in order: of the logs' motion, of the robot file and the method, of the rows, of the numbers. `bridged` is
+/// what the bridges of spikes move.
+pub(crate) fn lsq_notes(
+    problem: &LsqProblem,
+    rows: &LsqRows,
+    judged: &JudgedEstimate,
+    bridged: Option<FitNote>,
+) -> Result<Vec<StageNote>, IdentifyError> {
+    let (setup, estimate) = (&problem.data.setup, &judged.estimate);
+    let gains = problem.settings.gains.iter();
+    let mut notes = contacts_in(rows)?;
+    notes.extend(StageNote::of_robot(&setup.file));
+    notes.extend(gains.flat_map(|gains| gains.notes.clone()));
+    notes.extend(of_method(problem, judged).map(StageNote::Fit));
+    notes.extend(rows.notes());
+    let failed = judged.not_consistent.then_some(FitNote::NotConsistent);
+    let resting = rests(setup, &estimate.basis.sums.resting_shares());
+    notes.extend(failed.into_iter().chain(resting).map(StageNote::Fit));
+    notes.extend(friction_beyond(problem, judged)?);
+    let doubts = confounded(&estimate.fit, &judged.unknowns);
+    let doubts = bridged.into_iter().chain(doubts);
+    let of_numbers = doubts.chain(negative(&judged.unknowns));
+    notes.extend(of_numbers.map(StageNote::Fit));
+    notes.extend(judged.wrong_cutoffs.iter().cloned());
+    let geometry = judged.geometry.iter().cloned().map(Box::new);
+    notes.extend(geometry.map(FitNote::Geometry).map(StageNote::Fit));
+    Ok(notes)
+}
+
+/// What is noticed of how the fit was made.
+fn of_method(problem: &LsqProblem, judged: &JudgedEstimate) -> impl Iterator<Item = FitNote> {
+    let consistent = judged.consistent.iter().flat_map(ConsistentLinks::notes);
+    let law = problem.law;
+    let fitted = problem.before.is_none();
+    let fitted = fitted.then_some(FitNote::FrictionFitted { law });
+    consistent
+        .chain(fitted)
+        .chain(judged.estimate.account.notes())
+        .chain(problem.friction_of_reduced())
+}
+
+/// Joints that move faster than in the logs of their friction; none where the fit has the friction among its unknowns.
+fn friction_beyond(
+    problem: &LsqProblem,
+    judged: &JudgedEstimate,
+) -> Result<Vec<StageNote>, IdentifyError> {
+    let InertialEstimate {
+        columns,
+        covariance,
+        ..
+    } = &judged.estimate;
+    let beside = columns.known.iter().any(Option::is_some);
+    let Some(before) = problem.before.as_ref().filter(|_| beside) else {
+        return Ok(Vec::new());
+    };
+    let fastest = problem.data.top_speeds()?;
+    Ok(before.beyond(&problem.data.setup, columns, covariance, &fastest))
+}
 
 impl EstimatorAccount {
     /// What did not come as it should.
@@ -45,7 +110,7 @@ impl EstimatorAccount {
 const SHOWN_AT_REST: f64 = 0.01;
 
 /// Rows at rest that are not fitted.
-pub(crate) fn rests(setup: &RobotSetup, shares: &[f64]) -> Option<FitNote> {
+fn rests(setup: &RobotSetup, shares: &[f64]) -> Option<FitNote> {
     let names = setup.robot.joint_names().iter().cloned();
     let joints = names.zip(shares.iter().copied());
     let joints: Vec<(String, f64)> = joints
@@ -55,7 +120,7 @@ pub(crate) fn rests(setup: &RobotSetup, shares: &[f64]) -> Option<FitNote> {
 }
 
 /// Friction and inertias that are below zero by more than two deviations.
-pub(crate) fn negative(unknowns: &[FittedUnknown]) -> Option<FitNote> {
+fn negative(unknowns: &[FittedUnknown]) -> Option<FitNote> {
     let positive = |u: &&FittedUnknown| is_positive(&u.key, u.joint.is_some());
     let below = |u: &&FittedUnknown| u.fitted < -2.0 * u.fitted_std;
     let unknowns: Vec<_> = unknowns
@@ -78,7 +143,7 @@ pub(crate) fn negative(unknowns: &[FittedUnknown]) -> Option<FitNote> {
 }
 
 /// What the data do not separate.
-pub(crate) fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<FitNote> {
+fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<FitNote> {
     let name = |i: usize| match &unknowns[i].joint {
         Some(joint) if !unknowns[i].key.contains(joint.as_str()) => {
             format!("{} of {joint}", unknowns[i].key)

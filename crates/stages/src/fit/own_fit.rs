@@ -2,7 +2,8 @@
 //! the effects taken off. With no effect it gives back the given model.
 
 use super::consistent::project_by;
-use super::lsq::{LsqSettings, lsq};
+use super::lsq::lsq;
+use super::lsq_problem::LsqSettings;
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;

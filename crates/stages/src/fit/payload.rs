@@ -70,6 +70,7 @@ pub fn payload(
     given: &GivenModel,
     control: &Control,
 ) -> Result<Payload, IdentifyError> {
+    data.check_rows()?;
     let (setup, logs) = (&data.setup, data.logs.as_slice());
     let (name, file, model) = (given.name.as_str(), &given.file, &given.numbers()?);
     let robot = &setup.robot;

@@ -1,13 +1,9 @@
 //! What one reduced log or model says about a robot's parameters by itself.
 
-use std::slice::from_ref;
-use std::sync::Arc;
-
 use crate::fit::estimate::estimate;
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
-use crate::input::log_data::LogData;
-use crate::input::passes::LogPasses;
+use crate::input::lsq_rows::LsqRows;
 use crate::input::reduced::reduced_log::ReducedLog;
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::columns;
@@ -80,19 +76,15 @@ impl Source {
     }
 
     /// What a reduced log says by itself; all that is not determined has an infinite variance.
-    pub(crate) fn of_part(
-        part: &Arc<ReducedLog>,
-        control: &Control,
-    ) -> Result<Self, IdentifyError> {
+    pub(crate) fn of_part(part: &ReducedLog, control: &Control) -> Result<Self, IdentifyError> {
         let name = format!("the robot file of {}", part.name().replace('.', "-"));
         let file = RobotFile::parse(&name, &part.made_with.robot_file)?;
         let setup = RobotSetup::new(&name, file);
         part.belongs_to_robot(&setup.file)?;
-        let log = LogData::Reduced(part.clone());
         let known = part.known_friction();
         let linear = columns(&setup, known.as_deref());
-        let mut passes = LogPasses::new(&setup, from_ref(&log), control);
-        let found = match estimate(&mut passes, linear.clone(), EstimatorKind::Wls, false) {
+        let mut rows = LsqRows::of_reduced(&setup, part, control);
+        let found = match estimate(&mut rows, linear.clone(), EstimatorKind::Wls, false) {
             Ok(found) => Some(found.fit),
             // a log that says nothing is a log that says nothing
             Err(IdentifyError::Fit(_)) => None,

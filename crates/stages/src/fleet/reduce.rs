@@ -8,13 +8,13 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::log::Log;
-use crate::input::log_data::LogData;
-use crate::input::passes::{LogPasses, PositionFilter};
+use crate::input::lsq_rows::{LsqRows, PositionReading};
+use crate::input::position_cutoff::choose_smoothing;
 use crate::input::reduced::{MadeWith, ReducedLog, ReducedLogs, ReducedRows};
-use crate::input::repeated::each_row_once;
+use crate::input::repeated::{each_row_once, fitted_identities};
 use crate::input::unknowns::columns;
 use crate::note::StageNote;
-use cft_ident_core::robot::model::JointFriction;
+use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_files::config::robot_file::FrictionLawKind;
 
@@ -42,63 +42,73 @@ pub fn reduce(
     friction: Option<&GivenModel>,
     control: &Control,
 ) -> Result<ReducedLogs, IdentifyError> {
-    let (setup, logs) = (&data.setup, data.logs.as_slice());
+    let setup = &data.setup;
     let friction = friction.map(|given| (given.name.as_str(), &given.file));
     setup.check_gains()?;
-    each_row_once(setup, &[("reduce", logs)])?;
+    each_row_once(&[("reduce", fitted_identities(data))])?;
     if friction.is_none() && setup.file.friction_law() == FrictionLawKind::DoubleTanh {
         return Err(IdentifyError::LawIsNotLinear {
             estimator: "reduce",
         });
     }
-    let before = friction
-        .map(|given| FrictionBefore::of(setup, given, logs, (EstimatorKind::Wls, true), control));
+    let before =
+        friction.map(|given| FrictionBefore::of(data, given, (EstimatorKind::Wls, true), control));
     let known = before.transpose()?.map(|before| before.known);
     let made_with = MadeWith::of(&setup.file, friction.map(|f| f.0).zip(known.as_deref()));
     let made_with = Arc::new(made_with);
     let linear = columns(setup, known.as_deref());
-    let laws: Vec<Option<JointFriction>> = (linear.known.iter())
-        .map(|known| Some(JointFriction::DoubleTanh(known.as_ref()?.law)))
-        .collect();
-    let mut sets = Vec::new();
-    for log in logs {
-        if let LogData::Reduced(log) = log {
-            log.belongs_to(&made_with)?;
-            let logs = vec![log.clone()];
-            sets.push(ReducedLogs::of(logs));
-            continue;
-        }
-        let one = std::slice::from_ref(log);
-        let own = setup.own_settings(one, &laws, control)?;
-        let fastest = setup.fastest(one)?;
-        let mut passes = LogPasses::new(setup, one, control).each_by_itself(own.clone());
-        let declared = passes.read_condensed(&linear)?;
-        let narrower = passes.read(PositionFilter::Narrower, &linear.with_torque_rates(), None)?;
-        let mut shifted = Vec::new();
-        for grid in 0..passes.readings_again() {
-            shifted.extend(passes.read_shifted(&linear, grid, None)?);
-        }
-        let bounds_s = log.bounds()?;
-        let (Some(own), Some(summary), Some(provenance)) =
-            (own.into_iter().next(), passes.summary, passes.inputs.pop())
-        else {
-            return Err(IdentifyError::NoLog);
-        };
-        let reduced = ReducedLog {
-            made_with: made_with.clone(),
-            bounds_s,
-            // as it is read back
-            notes: (passes.notes.iter())
-                .map(|note| StageNote::OfReducedLog(note.to_string()))
-                .collect(),
-            summary,
-            own,
-            fastest,
-            readings: ReducedRows::of(declared, narrower, shifted),
-            provenance,
-        };
-        let logs = vec![Arc::new(reduced)];
-        sets.push(ReducedLogs::of(logs));
+    for part in &data.reduced {
+        part.belongs_to(&made_with)?;
+    }
+    let mut sets = vec![ReducedLogs::of(data.reduced.clone())];
+    for log in &data.logs {
+        let one = Dataset::new(setup, std::slice::from_ref(log));
+        let reduced = reduce_log(&one, &linear, &made_with, control)?;
+        sets.push(ReducedLogs::of(vec![Arc::new(reduced)]));
     }
     Ok(ReducedLogs::merge(sets)?)
+}
+
+/// Reduces the one log of a dataset, with the columns of `linear`.
+fn reduce_log(
+    data: &Dataset,
+    linear: &RegressorColumns,
+    made_with: &Arc<MadeWith>,
+    control: &Control,
+) -> Result<ReducedLog, IdentifyError> {
+    let [log] = data.logs.as_slice() else {
+        return Err(IdentifyError::NoLog);
+    };
+    let smoothing = choose_smoothing(data, &linear.known_laws(), control)?;
+    let mut rows = LsqRows::new(data, smoothing.clone(), control);
+    let declared = rows.fold(PositionReading::Declared, linear, None)?;
+    let rates = linear.with_torque_rates();
+    let narrower = rows.fold(PositionReading::Narrower, &rates, None)?;
+    let mut shifted = Vec::new();
+    for reading in 0..rows.readings_again() {
+        shifted.extend(rows.fold_again(reading, linear, None)?);
+    }
+    let (Some(smoothing), Some(summary), Some(provenance)) = (
+        smoothing.into_iter().next(),
+        rows.summary().cloned(),
+        rows.inputs().pop(),
+    ) else {
+        return Err(IdentifyError::NoLog);
+    };
+    // the declared reading keeps as many blocks as the others leave room for
+    let others = 1 + u64::from(rows.readings_again());
+    let declared = declared.condensed(provenance.samples, others);
+    Ok(ReducedLog {
+        made_with: made_with.clone(),
+        bounds_s: log.bounds(),
+        // as it is read back
+        notes: (rows.notes().iter())
+            .map(|note| StageNote::OfReducedLog(note.to_string()))
+            .collect(),
+        summary,
+        smoothing,
+        fastest: data.top_speeds()?,
+        readings: ReducedRows::of(declared, narrower, shifted),
+        provenance,
+    })
 }

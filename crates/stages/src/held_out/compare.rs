@@ -13,7 +13,7 @@ use crate::input::log::Log;
 use crate::input::log_data::LogData;
 use crate::input::model::refined_or_friction;
 use crate::input::position_cutoff::known;
-use crate::input::repeated::repeated_rows;
+use crate::input::repeated::{identities, repeated_rows};
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{ModelNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
@@ -237,13 +237,11 @@ pub fn compare(
     let setup = first.setup();
     let cautions = cautions(sides.each_ref(), !logs.is_empty()).into_iter();
     let mut notes: Vec<StageNote> = cautions.map(StageNote::Model).collect();
-    notes.extend(repeated_rows(logs, Some(&setup.file.layout())));
-    let tried = match logs {
+    let logs = LogData::read_all(&setup, logs, &[], control)?;
+    notes.extend(repeated_rows(&identities(&logs)));
+    let tried = match logs.as_slice() {
         [] => None,
-        logs => {
-            let logs = LogData::read_all(&setup, logs, &[], control)?;
-            Some(on_logs(&setup, &sides, &logs, control)?)
-        }
+        logs => Some(on_logs(&setup, &sides, logs, control)?),
     };
     if let Some(tried) = &tried {
         notes.extend(tried.in_memory.notes.iter().cloned());

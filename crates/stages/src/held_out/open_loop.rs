@@ -48,7 +48,7 @@ pub(crate) fn free_run(
     (logs, inputs): (&[LogData], &[Provenance]),
     control: &Control,
 ) -> Result<Option<FreeRun>, IdentifyError> {
-    if !is_in_si(setup) || logs.iter().any(|log| log.reduced().is_some()) {
+    if !is_in_si(setup) {
         return Ok(None);
     }
     let setup = &setup.with_position_cutoffs(logs, &known(&refined.model), control)?;

@@ -9,14 +9,12 @@ use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::read_whole;
-use crate::input::log::Log;
-use crate::input::log_data::LogData;
 use crate::input::model::refined;
 use crate::input::of_robot::{JointRanges, TorquePeaks};
 use crate::input::position_cutoff::known;
 use crate::input::reduced::error::ReducedError;
 use crate::input::reduced::reduced_log::ReducedLog;
-use crate::input::repeated::{repeated_rows, used_for};
+use crate::input::repeated::{fitted_identities, repeated_rows, used_for};
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::columns;
 use crate::note::{ModelNote, StageNote};
@@ -142,18 +140,13 @@ pub fn validate(
 
 /// The errors of a model on the logs that it was fitted to, as [`validate`] gives them.
 pub(crate) fn errors_on_fitted(
-    setup: &RobotSetup,
+    data: &Dataset,
     file: &ModelFile,
-    logs: &[LogData],
     control: &Control,
 ) -> Result<TorqueErrors, IdentifyError> {
-    let model = refined(file, &setup.name)?;
-    let whole = not_reduced(logs);
-    let setup = match whole.is_empty() {
-        true => setup.clone(),
-        false => setup.with_position_cutoffs(&whole, &known(&model.model), control)?,
-    };
-    let found = reconstruct(&setup, (&model, file), None, logs, control, &mut |_, _| {})?;
+    let model = refined(file, &data.setup.name)?;
+    let smoothed = &smoothed(data, &model, control)?;
+    let found = reconstruct(smoothed, (&model, file), None, control, &mut |_, _| {})?;
     Ok(found.validation.errors)
 }
 
@@ -163,20 +156,16 @@ fn errors_of(
     control: &Control,
     row: &mut dyn FnMut(&ReconstructedRow, Instant),
 ) -> Result<Validated, IdentifyError> {
-    let (setup, logs) = (&data.setup, data.logs.as_slice());
-    let whole = not_reduced(logs);
-    let setup = match whole.is_empty() {
-        true => setup.clone(),
-        false => setup.with_position_cutoffs(&whole, &known(&refined.model), control)?,
-    };
-    smoothed_alike(&setup, logs)?;
+    let data = &smoothed(data, refined, control)?;
+    let setup = &data.setup;
+    smoothed_alike(data)?;
     let of_model = (refined, file);
     // a band is of single rows, which a reduced log has not
-    let rows = whole.len() == logs.len();
+    let rows = data.reduced.is_empty();
     let band = Band::new(file, &refined.model).filter(|_| rows);
     let as_held = band.as_ref().and_then(|band| setup.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
-    let mut places = JointRanges::new(&setup);
+    let mut places = JointRanges::new(setup);
     let mut beyond = TorquePeaks::new(setup.robot.joints());
     let mut seen = |r: &ReconstructedRow, origin: Instant| {
         places.take(r.q);
@@ -187,11 +176,14 @@ fn errors_of(
         row(r, origin);
     };
     let mut found = match &as_held {
-        None => reconstruct(&setup, of_model, band.as_ref(), logs, control, &mut seen)?,
+        None => reconstruct(data, of_model, band.as_ref(), control, &mut seen)?,
         Some(as_held) => {
-            let mut found = reconstruct(&setup, of_model, None, logs, control, &mut |_, _| {})?;
-            let mut second =
-                reconstruct(as_held, of_model, band.as_ref(), logs, control, &mut seen)?;
+            let mut found = reconstruct(data, of_model, None, control, &mut |_, _| {})?;
+            let as_held = Dataset {
+                setup: as_held.clone(),
+                ..data.clone()
+            };
+            let mut second = reconstruct(&as_held, of_model, band.as_ref(), control, &mut seen)?;
             for (errors, by_band) in found.every().zip(second.every()) {
                 for (joint, by_band) in errors.joints.iter_mut().zip(&by_band.joints) {
                     joint.coverage_95 = by_band.coverage_95;
@@ -201,10 +193,10 @@ fn errors_of(
             found
         }
     };
-    if let Some(other) = places.refused(&setup) {
+    if let Some(other) = places.refused(setup) {
         return Err(other);
     }
-    if let Some(error) = beyond.impossible(found.judged(), &setup, logs) {
+    if let Some(error) = beyond.impossible(found.judged(), data) {
         let error = error.to_string();
         let note = StageNote::Model(ModelNote::ImpossibleTorque { error });
         found.notes.insert(0, note);
@@ -230,17 +222,17 @@ pub fn not_a_validation(errors: &TorqueErrors) -> Option<StageNote> {
 }
 
 /// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
-fn smoothed_alike(setup: &RobotSetup, logs: &[LogData]) -> Result<(), IdentifyError> {
-    let parts: Vec<&ReducedLog> = logs.iter().filter_map(LogData::reduced).collect();
+fn smoothed_alike(data: &Dataset) -> Result<(), IdentifyError> {
+    let (setup, parts) = (&data.setup, &data.reduced);
     let Some(first) = parts.first().filter(|_| setup.finds_cutoffs()) else {
         return Ok(());
     };
-    let together = match parts.len() == logs.len() {
-        true => &first.own.cutoffs_hz,
+    let together = match data.logs.is_empty() {
+        true => &first.smoothing.cutoffs_hz,
         false => &*setup.position_cutoffs_hz,
     };
-    for part in &parts {
-        let own = &part.own.cutoffs_hz;
+    for part in parts {
+        let own = &part.smoothing.cutoffs_hz;
         let differs = |(_, (a, b)): &(usize, (&f64, &f64))| a != b;
         let joint = own.iter().zip(together).enumerate().find(differs);
         if let Some((j, (own, other))) = joint {
@@ -260,42 +252,51 @@ fn smoothed_alike(setup: &RobotSetup, logs: &[LogData]) -> Result<(), IdentifyEr
     Ok(())
 }
 
-/// The logs whose rows are there.
-fn not_reduced(logs: &[LogData]) -> Vec<LogData> {
-    let whole = logs.iter().filter(|log| log.reduced().is_none());
-    whole.cloned().collect()
+/// The data with the position cut-offs that the logs call for, by the friction of a model.
+fn smoothed(
+    data: &Dataset,
+    model: &AugmentedModel,
+    control: &Control,
+) -> Result<Dataset, IdentifyError> {
+    let setup = match data.logs.as_slice() {
+        [] => data.setup.clone(),
+        logs => (data.setup).with_position_cutoffs(logs, &known(&model.model), control)?,
+    };
+    Ok(Dataset {
+        setup,
+        ..data.clone()
+    })
 }
 
 fn reconstruct(
-    setup: &RobotSetup,
+    data: &Dataset,
     (refined, file): (&AugmentedModel, &ModelFile),
     band: Option<&Band>,
-    logs: &[LogData],
     control: &Control,
     row: &mut dyn FnMut(&ReconstructedRow, Instant),
 ) -> Result<Validated, IdentifyError> {
-    let work = control.begin("reconstruction", Some(logs.len() as u64));
+    let (setup, logs) = (&data.setup, data.logs.as_slice());
+    let steps = data.reduced.len() + logs.len();
+    let work = control.begin("reconstruction", Some(steps as u64));
     let widths = band.map(|band| {
         |motion: [&[f64]; 3], tau: &[f64], out: &mut [f64]| band.half_widths(motion, tau, out)
     });
     let widths: Option<HalfWidths> = widths.as_ref().map(|widths| widths as HalfWidths);
-    let speeds = setup.rest_speeds(&not_reduced(logs))?;
+    let speeds = setup.rest_speeds(logs)?;
     let mut all = TorqueReconstruction::new(&refined.model, &speeds, widths);
     let (mut inputs, mut last) = (Vec::new(), None);
-    let sources: Vec<Log> = logs.iter().map(LogData::source).collect();
-    let mut notes = repeated_rows(&sources, Some(&setup.file.layout()));
+    let mut notes = repeated_rows(&fitted_identities(data));
     let settings = setup.settings();
     let mut segments = 0;
+    for part in &data.reduced {
+        add_reduced(&mut all, setup, refined, part)?;
+        notes.extend(part.notes.iter().cloned());
+        inputs.push(part.provenance.clone());
+        last = Some(part.summary.clone());
+        all.end_log();
+        work.advance(1);
+    }
     for log in logs {
-        if let Some(part) = log.reduced() {
-            add_reduced(&mut all, setup, refined, part)?;
-            notes.extend(part.notes.iter().cloned());
-            inputs.push(part.provenance.clone());
-            last = Some(part.summary.clone());
-            all.end_log();
-            work.advance(1);
-            continue;
-        }
         if refined.effects.is_empty() {
             let mut open = log.open(control)?;
             let origin = open.origin();
@@ -328,7 +329,7 @@ fn reconstruct(
         all.end_log();
         work.advance(1);
     }
-    if let Some(part) = logs.iter().find_map(LogData::reduced) {
+    if let Some(part) = data.reduced.first() {
         notes.push(StageNote::Model(ModelNote::ErrorsOfReduced {
             log: part.name().to_owned(),
         }));
@@ -336,9 +337,12 @@ fn reconstruct(
     let summary = last.ok_or(IdentifyError::NoLog)?;
     let used = used_for(file, &inputs);
     let part = |of_use: bool| ErrorsOfLogs {
-        logs: (logs.iter().zip(&used).filter(|(_, used)| **used == of_use))
-            .map(|(log, _)| log.name())
-            .collect(),
+        logs: (inputs
+            .iter()
+            .zip(&used)
+            .filter(|(_, used)| **used == of_use))
+        .map(|(input, _)| input.name.clone())
+        .collect(),
         errors: all.errors_of(|log| used.get(log) == Some(&of_use)),
     };
     let apart = used.contains(&true) && used.contains(&false);

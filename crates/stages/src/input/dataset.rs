@@ -1,15 +1,19 @@
 //! What a stage works on: a robot and its logs, and a model of it.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::log::Log;
-use super::log_data::LogData;
+use super::log::{Log, without_rows};
+use super::log_data::{LogData, raise};
 use super::model::refined;
+use super::reduced::error::ReducedError;
+use super::reduced::reduced_log::ReducedLog;
 use super::robot_setup::RobotSetup;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_files::config::ModelFile;
+use cft_ident_logs::log::escape;
 
 /// A robot and its logs, by what they are for.
 #[derive(Debug, Clone)]
@@ -21,10 +25,12 @@ pub struct Dataset {
     pub one_joint: Vec<LogData>,
     /// Logs that are never fitted and judge what is added to a model.
     pub held_out: Vec<LogData>,
+    /// Logs without rows, which `lsq`, `reduce` and `validate` take before those of `logs`; other stages refuse them.
+    pub reduced: Vec<Arc<ReducedLog>>,
 }
 
 impl Dataset {
-    /// Reads logs of a robot, all of them to be fitted or looked at.
+    /// Reads logs of a robot, all of them to be fitted or looked at; reduced ones are kept apart.
     ///
     /// # Errors
     /// Logs that cannot be read.
@@ -33,8 +39,18 @@ impl Dataset {
         logs: &[Log],
         control: &Control,
     ) -> Result<Self, IdentifyError> {
-        let logs = LogData::read_all(setup, logs, &[], control)?;
-        Ok(Self::new(setup, &logs))
+        let (mut with_rows, mut reduced) = (Vec::new(), Vec::new());
+        for log in logs {
+            match log {
+                Log::Reduced(part) => reduced.push(Arc::clone(part)),
+                log => with_rows.push(log.clone()),
+            }
+        }
+        let logs = LogData::read_all(setup, &with_rows, &[], control)?;
+        Ok(Dataset {
+            reduced,
+            ..Self::new(setup, &logs)
+        })
     }
 
     /// The same with logs that are held out.
@@ -59,6 +75,7 @@ impl Dataset {
             logs: again(&self.logs)?,
             one_joint: again(&self.one_joint)?,
             held_out: again(&self.held_out)?,
+            reduced: self.reduced.clone(),
             setup,
         })
     }
@@ -70,7 +87,63 @@ impl Dataset {
             logs: logs.to_vec(),
             one_joint: Vec::new(),
             held_out: Vec::new(),
+            reduced: Vec::new(),
         }
+    }
+
+    /// Refuses logs of held poses, which say nothing of inertia: gravity is fitted to them another way.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Held`] where each log holds pose after pose, and logs that fits refuse.
+    pub fn check_moving(&self) -> Result<(), IdentifyError> {
+        let mut held = None;
+        for log in &self.logs {
+            let Some(share) = log.usable()?.held_share else {
+                return Ok(());
+            };
+            held = Some(IdentifyError::Held {
+                log: escape(&log.name()),
+                share,
+            });
+        }
+        // what was reduced was checked then
+        held.filter(|_| self.reduced.is_empty()).map_or(Ok(()), Err)
+    }
+
+    /// Refuses reduced logs, whose rows are not there any more.
+    ///
+    /// # Errors
+    /// The first reduced log.
+    pub(crate) fn check_rows(&self) -> Result<(), IdentifyError> {
+        match self.reduced.first() {
+            Some(part) => Err(without_rows(part).into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses reduced logs for `what`, which needs rows; `remedy` says what to do.
+    ///
+    /// # Errors
+    /// The first reduced log.
+    pub(crate) fn needs_rows(&self, what: &str, remedy: &'static str) -> Result<(), IdentifyError> {
+        let Some(part) = self.reduced.first() else {
+            return Ok(());
+        };
+        Err(ReducedError::NeedsLog {
+            log: part.name().to_owned(),
+            what: what.to_owned(),
+            remedy,
+        }
+        .into())
+    }
+
+    /// Greatest speed of every joint in the logs that are fitted [m/s or rad/s].
+    pub(crate) fn top_speeds(&self) -> Result<Vec<f64>, IdentifyError> {
+        let mut greatest = self.setup.top_speeds(&self.logs)?;
+        for part in &self.reduced {
+            raise(&mut greatest, &part.fastest);
+        }
+        Ok(greatest)
     }
 
     /// The same with logs that are held out.

@@ -53,10 +53,10 @@ impl Log {
     /// Another number of values than there are positions.
     pub fn with_references(self, references: &[f64]) -> Result<Self, LogError> {
         match self {
-            Self::File(_) | Self::Reduced(_) => Ok(self),
             Self::Arrays(arrays) => Ok(Self::Arrays(Arc::new(
                 LogArrays::clone(&arrays).with_references(references.to_vec())?,
             ))),
+            other => Ok(other),
         }
     }
 
@@ -67,18 +67,10 @@ impl Log {
     /// Another number of values than there are rows, and one that is no number.
     pub fn with_temperature(self, joint: usize, temperatures: &[f64]) -> Result<Self, LogError> {
         match self {
-            Self::File(_) | Self::Reduced(_) => Ok(self),
             Self::Arrays(arrays) => Ok(Self::Arrays(Arc::new(
                 LogArrays::clone(&arrays).with_temperature(joint, temperatures.to_vec())?,
             ))),
-        }
-    }
-
-    /// The log, where it is reduced.
-    pub fn reduced(&self) -> Option<&ReducedLog> {
-        match self {
-            Self::Reduced(part) => Some(part),
-            _ => None,
+            other => Ok(other),
         }
     }
 
@@ -94,8 +86,8 @@ impl Log {
     /// The same log with the torques of each joint times a factor of its own, where it is in memory.
     pub(crate) fn with_torques_times(&self, factors: &[f64]) -> Result<Self, LogError> {
         Ok(match self {
-            Self::File(_) | Self::Reduced(_) => self.clone(),
             Self::Arrays(arrays) => Self::Arrays(Arc::new(arrays.with_torques_times(factors)?)),
+            other => other.clone(),
         })
     }
 

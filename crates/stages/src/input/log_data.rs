@@ -1,4 +1,4 @@
-//! A log as stages take it: read by a robot file, or reduced to what a linear fit needs.
+//! A log as stages take it: read by a robot file.
 
 use std::sync::Arc;
 
@@ -7,23 +7,17 @@ use super::error::IdentifyError;
 use super::free_swing::moves_freely;
 use super::log::{Log, arrays_layout, without_rows};
 use super::open_log::OpenLog;
-use super::reduced::reduced_log::ReducedLog;
 use super::reference::LoggedReference;
 use super::robot_setup::RobotSetup;
 use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
 use cft_ident_logs::recording::{Recording, RecordingRequest, TorqueCourse};
 
-/// A log that was read, or a reduced one.
+/// A log that was read.
 #[derive(Debug, Clone)]
-pub enum LogData {
-    /// Its rows.
-    Recorded {
-        /// Where it was read from.
-        source: Log,
-        recording: Arc<Recording>,
-    },
-    /// Sums without rows.
-    Reduced(Arc<ReducedLog>),
+pub struct LogData {
+    /// Where it was read from.
+    pub source: Log,
+    recording: Arc<Recording>,
 }
 
 impl LogData {
@@ -31,7 +25,7 @@ impl LogData {
     /// for which fits refuse it is read, and refused where its rows are asked for.
     ///
     /// # Errors
-    /// Logs that cannot be read.
+    /// Logs that cannot be read, reduced ones among them.
     pub fn read_all(
         setup: &RobotSetup,
         logs: &[Log],
@@ -76,16 +70,11 @@ impl LogData {
         control: &Control,
     ) -> Result<Self, IdentifyError> {
         let layout = setup.file.layout();
-        let again = Self::read_by(setup, &self.source(), &layout, &[self], control)?;
-        Ok(match (self, again) {
-            (Self::Recorded { recording: own, .. }, Self::Recorded { source, recording }) => {
-                let recording = Arc::unwrap_or_clone(recording).minus_torque_of(own);
-                Self::Recorded {
-                    source,
-                    recording: Arc::new(recording),
-                }
-            }
-            (_, again) => again,
+        let again = Self::read_by(setup, &self.source, &layout, &[self], control)?;
+        let recording = Arc::unwrap_or_clone(again.recording).minus_torque_of(&self.recording);
+        Ok(LogData {
+            recording: Arc::new(recording),
+            ..again
         })
     }
 
@@ -96,10 +85,7 @@ impl LogData {
         beside: &[&LogData],
         control: &Control,
     ) -> Result<Self, IdentifyError> {
-        let beside = beside.iter().filter_map(|other| match other {
-            Self::Recorded { recording, .. } => Some(&**recording),
-            Self::Reduced(_) => None,
-        });
+        let beside = beside.iter().map(|other| &*other.recording);
         let (keep, stop) = (&setup.file.log.keep, || control.stopped());
         let request = RecordingRequest {
             layout: match log {
@@ -115,7 +101,7 @@ impl LogData {
         let read = match log {
             Log::File(spec) => Recording::read(spec, &request),
             Log::Arrays(arrays) => Recording::of_arrays(arrays, &request),
-            Log::Reduced(part) => return Ok(Self::Reduced(Arc::clone(part))),
+            Log::Reduced(part) => Err(without_rows(part)),
         };
         let read = read.map_err(|error| match error {
             LogError::Interrupted => IdentifyError::Interrupted,
@@ -133,53 +119,28 @@ impl LogData {
             read.set_swings_freely(freely);
             read = read.cut_by(&longest);
         }
-        Ok(Self::Recorded {
+        Ok(LogData {
             source: log.clone(),
             recording: Arc::new(read),
         })
     }
 
-    /// Where it was read from.
-    pub fn source(&self) -> Log {
-        match self {
-            Self::Recorded { source, .. } => source.clone(),
-            Self::Reduced(part) => Log::Reduced(Arc::clone(part)),
-        }
-    }
-
-    /// The log, where it is reduced.
-    pub fn reduced(&self) -> Option<&ReducedLog> {
-        match self {
-            Self::Recorded { .. } => None,
-            Self::Reduced(part) => Some(part),
-        }
-    }
-
     /// Name of the log in messages and results, without folders.
     pub fn name(&self) -> String {
-        match self {
-            Self::Recorded { source, .. } => source.name(),
-            Self::Reduced(part) => part.name().to_owned(),
-        }
+        self.source.name()
     }
 
-    /// What was read.
-    ///
-    /// # Errors
-    /// A reduced log.
-    pub fn recording(&self) -> Result<&Arc<Recording>, LogError> {
-        match self {
-            Self::Recorded { recording, .. } => Ok(recording),
-            Self::Reduced(part) => Err(without_rows(part)),
-        }
+    /// What was read, whatever is wrong with it.
+    pub fn recording(&self) -> &Arc<Recording> {
+        &self.recording
     }
 
     /// What was read, for a fit.
     ///
     /// # Errors
-    /// A reduced log, one whose rows are poses, and one with a fault for which fits refuse it.
+    /// A log whose rows are poses, and one with a fault for which fits refuse it.
     pub(crate) fn usable(&self) -> Result<&Arc<Recording>, IdentifyError> {
-        let recording = self.recording()?;
+        let recording = &self.recording;
         if let Some(rate_hz) = recording.poses_hz {
             return Err(IdentifyError::Poses {
                 log: escape(&self.name()),
@@ -228,26 +189,22 @@ impl LogData {
 
     /// The positions that the controller was asked for, where they are known.
     pub(crate) fn references(&self) -> Result<Option<LoggedReference>, IdentifyError> {
-        let references = self.recording()?.references()?;
+        let references = self.recording.references()?;
         Ok(references.map(LoggedReference::new))
     }
 
     /// The same log less the torques of a course.
     pub(crate) fn minus_torque(&self, course: TorqueCourse) -> Self {
-        match self {
-            Self::Recorded { source, recording } => Self::Recorded {
-                source: source.clone(),
-                recording: Arc::new(recording.minus_torque(course)),
-            },
-            Self::Reduced(_) => self.clone(),
+        LogData {
+            source: self.source.clone(),
+            recording: Arc::new(self.recording.minus_torque(course)),
         }
     }
 
     /// First and last time, by the log's own clock [s].
-    pub(crate) fn bounds(&self) -> Result<[f64; 2], IdentifyError> {
-        let recording = self.usable()?;
-        let zero = recording.origin().seconds();
-        Ok(recording.time_span.map(|t| zero + t))
+    pub(crate) fn bounds(&self) -> [f64; 2] {
+        let zero = self.recording.origin().seconds();
+        self.recording.time_span.map(|t| zero + t)
     }
 
     /// Time of the first row that is read, as its rows have it [s].
@@ -259,54 +216,28 @@ impl LogData {
 impl RobotSetup {
     /// Speed up to which each joint rests, by the log in which it moves most [m/s or rad/s].
     pub(crate) fn rest_speeds(&self, logs: &[LogData]) -> Result<Vec<f64>, IdentifyError> {
-        self.greatest(logs, |log| Ok(&log.usable()?.rest_speed))
+        let mut greatest = vec![0.0; self.robot.joints()];
+        for log in logs {
+            raise(&mut greatest, &log.usable()?.rest_speed);
+        }
+        Ok(greatest)
     }
 
     /// Greatest speed of every joint in these logs [m/s or rad/s].
-    pub(crate) fn fastest(&self, logs: &[LogData]) -> Result<Vec<f64>, IdentifyError> {
-        self.greatest(logs, |log| {
-            Ok(match log {
-                LogData::Reduced(part) => &part.fastest,
-                LogData::Recorded { .. } => &log.usable()?.top_speed,
-            })
-        })
-    }
-
-    /// The greatest of each joint in all logs.
-    fn greatest<'a>(
-        &self,
-        logs: &'a [LogData],
-        of: impl Fn(&'a LogData) -> Result<&'a Vec<f64>, IdentifyError>,
-    ) -> Result<Vec<f64>, IdentifyError> {
-        let mut greatest = vec![0.0_f64; self.robot.joints()];
+    pub(crate) fn top_speeds(&self, logs: &[LogData]) -> Result<Vec<f64>, IdentifyError> {
+        let mut greatest = vec![0.0; self.robot.joints()];
         for log in logs {
-            for (greatest, of_log) in greatest.iter_mut().zip(of(log)?) {
-                *greatest = of_log.max(*greatest);
-            }
+            raise(&mut greatest, &log.usable()?.top_speed);
         }
         Ok(greatest)
     }
 }
 
-/// Refuses logs of held poses, which say nothing of inertia: gravity is fitted to them another way.
-///
-/// # Errors
-/// [`IdentifyError::Held`] where each log holds pose after pose, and logs that fits refuse.
-pub fn check_moving(logs: &[LogData]) -> Result<(), IdentifyError> {
-    let mut held = None;
-    for log in logs {
-        if log.reduced().is_some() {
-            return Ok(());
-        }
-        let Some(share) = log.usable()?.held_share else {
-            return Ok(());
-        };
-        held = Some(IdentifyError::Held {
-            log: escape(&log.name()),
-            share,
-        });
+/// Raises each number to another where that is greater.
+pub(crate) fn raise(greatest: &mut [f64], others: &[f64]) {
+    for (greatest, other) in greatest.iter_mut().zip(others) {
+        *greatest = other.max(*greatest);
     }
-    held.map_or(Ok(()), Err)
 }
 
 /// Whether numbers of these logs are bridged.

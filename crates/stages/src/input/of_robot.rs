@@ -1,5 +1,6 @@
 //! Whether a log can be of the robot of a model: where its joints stand, and how large its torques are.
 
+use super::dataset::Dataset;
 use super::error::IdentifyError;
 use super::log_data::LogData;
 use super::robot_setup::RobotSetup;
@@ -107,8 +108,7 @@ impl TorquePeaks {
     pub(crate) fn impossible(
         &self,
         errors: &TorqueErrors,
-        setup: &RobotSetup,
-        logs: &[LogData],
+        data: &Dataset,
     ) -> Option<IdentifyError> {
         let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
         let rms = |j: usize| errors.joints.get(j).map_or(0.0, |e| e.rmse);
@@ -116,14 +116,14 @@ impl TorquePeaks {
             **m > 0.0 && r.0 > IMPOSSIBLE_TORQUE_RATIO * **m && rms(*j) > **m
         });
         let (j, (measured, (torque, t))) = off.next()?;
-        let names: Vec<String> = logs.iter().map(LogData::name).collect();
+        let names: Vec<String> = data.logs.iter().map(LogData::name).collect();
         Some(IdentifyError::Impossible {
-            joint: setup.robot.joint_names()[j].clone(),
+            joint: data.setup.robot.joint_names()[j].clone(),
             log: names.join(", "),
             t: *t,
             torque: *torque,
             measured: *measured,
-            unit: setup.file.torque_unit(j),
+            unit: data.setup.file.torque_unit(j),
         })
     }
 }

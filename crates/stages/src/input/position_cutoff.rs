@@ -7,9 +7,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::control::Control;
+use super::dataset::Dataset;
 use super::error::IdentifyError;
 use super::log_data::LogData;
-use super::own_settings::{CutoffCosts, JointCost, OwnSettings};
+use super::log_smoothing::{CutoffCosts, JointCost, LogSmoothing};
 use super::robot_setup::RobotSetup;
 use crate::note::{FitNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
@@ -157,6 +158,18 @@ pub(crate) fn known(model: &Model) -> Vec<Option<JointFriction>> {
     model.friction.iter().map(|law| Some(*law)).collect()
 }
 
+/// How each log that is fitted is smoothed by itself, in the order of [`LsqRows`](super::lsq_rows::LsqRows). `laws` is the
+/// friction of each joint, none where it is not known.
+pub(crate) fn choose_smoothing(
+    data: &Dataset,
+    laws: &[Option<JointFriction>],
+    control: &Control,
+) -> Result<Vec<LogSmoothing>, IdentifyError> {
+    let reduced = data.reduced.iter().map(|part| Ok(part.smoothing.clone()));
+    let smoothing = |log: &LogData| data.setup.smoothing_of(log, laws, control);
+    reduced.chain(data.logs.iter().map(smoothing)).collect()
+}
+
 impl RobotSetup {
     /// The same robot with the position cut-offs that its logs call for; a law is none where it is not known.
     pub(crate) fn with_position_cutoffs(
@@ -204,32 +217,25 @@ impl RobotSetup {
         Ok(self.with_cutoffs(&self.cutoff_costs(logs, laws, rest_speed, control)?))
     }
 
-    /// What each log calls for. `laws` is the friction of each joint, none where it is not known.
-    pub(crate) fn own_settings(
+    /// What a log calls for by itself.
+    fn smoothing_of(
         &self,
-        logs: &[LogData],
+        log: &LogData,
         laws: &[Option<JointFriction>],
         control: &Control,
-    ) -> Result<Vec<OwnSettings>, IdentifyError> {
-        logs.iter()
-            .map(|log| {
-                if let LogData::Reduced(part) = log {
-                    return Ok(part.own.clone());
-                }
-                let rest_speed = self.rest_speeds(std::slice::from_ref(log))?;
-                let costs =
-                    self.cutoff_costs(std::slice::from_ref(log), laws, &rest_speed, control)?;
-                let cutoffs_hz = match self.finds_cutoffs() {
-                    true => costs.found(),
-                    false => Vec::new(),
-                };
-                Ok(OwnSettings {
-                    rest_speed,
-                    cutoffs_hz,
-                    costs,
-                })
-            })
-            .collect()
+    ) -> Result<LogSmoothing, IdentifyError> {
+        let log = std::slice::from_ref(log);
+        let rest_speed = self.rest_speeds(log)?;
+        let costs = self.cutoff_costs(log, laws, &rest_speed, control)?;
+        let cutoffs_hz = match self.finds_cutoffs() {
+            true => costs.found(),
+            false => Vec::new(),
+        };
+        Ok(LogSmoothing {
+            rest_speed,
+            cutoffs_hz,
+            costs,
+        })
     }
 
     /// Whether position cut-offs are found from the logs.
@@ -288,20 +294,16 @@ impl RobotSetup {
         })
     }
 
-    /// What cut-offs cost the friction of every joint on logs.
-    pub(crate) fn cutoff_costs(
+    /// The first rows of logs as stretches, positions as logged.
+    fn first_stretches(
         &self,
         logs: &[LogData],
-        laws: &[Option<JointFriction>],
-        rest_speed: &[f64],
         control: &Control,
-    ) -> Result<CutoffCosts, IdentifyError> {
-        let settings = self.settings();
+    ) -> Result<Vec<Stretch>, IdentifyError> {
         let raw = FilterSettings {
             q_order: 0,
-            ..settings.clone()
+            ..self.settings()
         };
-        let n = self.robot.joints();
         let most = (MOST_ROWS / logs.len().max(1)).max(LEAST_ROWS);
         let mut all: Vec<Stretch> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
@@ -312,13 +314,27 @@ impl RobotSetup {
                 rows += block.len();
                 Ok(more && rows < most)
             };
-            match stretches(index, n, &raw, &mut read) {
+            match stretches(index, self.robot.joints(), &raw, &mut read) {
                 Ok((found, _)) => all.extend(found),
                 // what reads the log whole says what is wrong with it
                 Err(RunError::Motion(_)) => {}
                 Err(error) => return Err(IdentifyError::of_run(&log.name(), error)),
             }
         }
+        Ok(all)
+    }
+
+    /// What cut-offs cost the friction of every joint on logs.
+    pub(crate) fn cutoff_costs(
+        &self,
+        logs: &[LogData],
+        laws: &[Option<JointFriction>],
+        rest_speed: &[f64],
+        control: &Control,
+    ) -> Result<CutoffCosts, IdentifyError> {
+        let settings = self.settings();
+        let n = self.robot.joints();
+        let all = self.first_stretches(logs, control)?;
         let rate = all.iter().map(|s| 1.0 / s.dt).fold(f64::INFINITY, f64::min);
         let tried = match settings.q_order {
             0 => Vec::new(),

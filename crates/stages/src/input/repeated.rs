@@ -1,21 +1,77 @@
 //! One log given twice: rows that count twice make deviations too small, and what was fitted is no holdout.
 
+use super::dataset::Dataset;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::log_data::LogData;
-use super::robot_setup::RobotSetup;
+use super::reduced::reduced_log::ReducedLog;
 use crate::note::{LogNote, StageNote};
 use cft_ident_files::config::ModelFile;
-use cft_ident_logs::log::{DataRole, Layout, Provenance, escape, sha256, shares_rows};
+use cft_ident_logs::log::{DataRole, Layout, LogSpec, Provenance, escape, shares_rows};
 
-/// Logs by what they are used for.
-pub(crate) type Role<'a> = (&'static str, &'a [LogData]);
+/// What distinguishes the rows of a log from others.
+pub(crate) struct RowIdentity {
+    /// Name and span, for messages.
+    shown: String,
+    /// Of the whole log; none where it cannot be read any more.
+    sha256: Option<String>,
+    /// First and last time, by the log's own clock \[s\].
+    bounds_s: [f64; 2],
+}
+
+impl RowIdentity {
+    fn of_log(log: &LogData) -> Self {
+        let provenance = log.recording().identity().ok();
+        RowIdentity {
+            shown: shown_log(&log.source),
+            sha256: provenance.map(|provenance| provenance.sha256),
+            bounds_s: log.bounds(),
+        }
+    }
+
+    fn of_reduced(part: &ReducedLog) -> Self {
+        let span = part.provenance.span.iter();
+        let span: String = span.map(|span| format!("@{span}")).collect();
+        RowIdentity {
+            shown: escape(part.name()) + &span,
+            sha256: Some(part.provenance.sha256.clone()),
+            bounds_s: part.bounds_s,
+        }
+    }
+
+    fn shares_rows(&self, other: &Self) -> bool {
+        let [a, b] = [self.bounds_s, other.bounds_s];
+        let overlap = a[0] <= b[1] && b[0] <= a[1];
+        overlap && self.sha256.is_some() && self.sha256 == other.sha256
+    }
+}
+
+/// What distinguishes the rows of each of these logs.
+pub(crate) fn identities(logs: &[LogData]) -> Vec<RowIdentity> {
+    logs.iter().map(RowIdentity::of_log).collect()
+}
+
+/// The same of the logs of a dataset that are fitted, reduced ones among them.
+pub(crate) fn fitted_identities(data: &Dataset) -> Vec<RowIdentity> {
+    let reduced = data
+        .reduced
+        .iter()
+        .map(|part| RowIdentity::of_reduced(part));
+    reduced.chain(identities(&data.logs)).collect()
+}
 
 /// Refuses two logs with the same rows, within a role and between roles.
-pub(crate) fn each_row_once(setup: &RobotSetup, roles: &[Role]) -> Result<(), IdentifyError> {
-    let sources = |(role, logs): &Role| (*role, logs.iter().map(LogData::source).collect());
-    let all: Vec<(&str, Vec<Log>)> = roles.iter().map(sources).collect();
-    each_log_once(&all, Some(&setup.file.layout()))
+pub(crate) fn each_row_once(
+    roles: &[(&'static str, Vec<RowIdentity>)],
+) -> Result<(), IdentifyError> {
+    let all = roles.iter();
+    let all = all.flat_map(|(role, logs)| logs.iter().map(move |log| (*role, log)));
+    let all: Vec<(&'static str, &RowIdentity)> = all.collect();
+    let pair = pairs(all.len(), |i, k| all[i].1.shares_rows(all[k].1)).next();
+    let shown = |(role, log): (&'static str, &RowIdentity)| (role, log.shown.clone());
+    pair.map_or(Ok(()), |(i, k)| {
+        Err(same_rows(shown(all[i]), shown(all[k])))
+    })
 }
 
 /// The same of logs that are not read yet; `layout` names the time column where a robot is known.
@@ -27,17 +83,27 @@ pub fn each_log_once(
     layout: Option<&Layout>,
 ) -> Result<(), IdentifyError> {
     let all = roles.iter();
-    let all = all.flat_map(|(role, logs)| logs.iter().map(|log| (*role, log)));
-    let all: Vec<(&str, &Log)> = all.collect();
-    let logs: Vec<&Log> = all.iter().map(|(_, log)| *log).collect();
-    match pairs(&logs, layout).next() {
-        None => Ok(()),
-        Some((i, k)) => Err(IdentifyError::SameRows {
-            first: all[i].1.shown(),
-            first_role: all[i].0,
-            second: all[k].1.shown(),
-            second_role: all[k].0,
-        }),
+    let all = all.flat_map(|(role, logs)| logs.iter().map(move |log| (*role, log)));
+    let all: Vec<(&'static str, &Log)> = all.collect();
+    let same = |i: usize, k: usize| match (all[i].1, all[k].1) {
+        (Log::File(a), Log::File(b)) => shares_rows(a, b, layout),
+        (Log::Arrays(a), Log::Arrays(b)) => a.sha256() == b.sha256(),
+        _ => false,
+    };
+    let shown = |(role, log): (&'static str, &Log)| (role, shown_log(log));
+    let pair = pairs(all.len(), same).next();
+    pair.map_or(Ok(()), |(i, k)| {
+        Err(same_rows(shown(all[i]), shown(all[k])))
+    })
+}
+
+/// The refusal of two logs with the same rows, each a role and a name.
+fn same_rows(first: (&'static str, String), second: (&'static str, String)) -> IdentifyError {
+    IdentifyError::SameRows {
+        first: first.1,
+        first_role: first.0,
+        second: second.1,
+        second_role: second.0,
     }
 }
 
@@ -68,82 +134,57 @@ pub(crate) fn unseen_by(
 }
 
 /// Logs of the list that share no row with one of the others.
-pub(crate) fn without_rows_of(
-    setup: &RobotSetup,
-    logs: &[LogData],
-    others: &[LogData],
-) -> Vec<LogData> {
-    let layout = setup.file.layout();
+pub(crate) fn without_rows_of(logs: &[LogData], others: &[LogData]) -> Vec<LogData> {
+    let others = identities(others);
     let fresh = |log: &&LogData| {
-        !others
-            .iter()
-            .any(|other| same_rows(&log.source(), &other.source(), Some(&layout)))
+        let own = RowIdentity::of_log(log);
+        !others.iter().any(|other| own.shares_rows(other))
     };
     logs.iter().filter(fresh).cloned().collect()
 }
 
-/// A note for each two logs with the same rows, for commands that only look; `layout` names the time column
-/// where a robot is known.
-pub fn repeated_rows(logs: &[Log], layout: Option<&Layout>) -> Vec<StageNote> {
-    let all: Vec<&Log> = logs.iter().collect();
-    pairs(&all, layout)
-        .map(|(i, k)| {
-            let (first, second) = (all[i].shown(), all[k].shown());
-            StageNote::Log(LogNote::Repeated { first, second })
-        })
+/// A note for each two logs with the same rows.
+pub(crate) fn repeated_rows(logs: &[RowIdentity]) -> Vec<StageNote> {
+    let pairs = pairs(logs.len(), |i, k| logs[i].shares_rows(&logs[k]));
+    pairs
+        .map(|(i, k)| note(&logs[i].shown, &logs[k].shown))
         .collect()
 }
 
-fn pairs<'a>(
-    logs: &'a [&'a Log],
-    layout: Option<&'a Layout>,
-) -> impl Iterator<Item = (usize, usize)> + 'a {
-    let places = (0..logs.len()).flat_map(|k| (0..k).map(move |i| (i, k)));
-    places.filter(move |(i, k)| same_rows(logs[*i], logs[*k], layout))
+/// The same of files that no robot file describes; `layout` names the time column where a robot is known.
+pub fn repeated_files(logs: &[LogSpec], layout: Option<&Layout>) -> Vec<StageNote> {
+    let pairs = pairs(logs.len(), |i, k| shares_rows(&logs[i], &logs[k], layout));
+    pairs
+        .map(|(i, k)| note(&shown(&logs[i]), &shown(&logs[k])))
+        .collect()
 }
 
-fn same_rows(a: &Log, b: &Log, layout: Option<&Layout>) -> bool {
-    match (a, b) {
-        (Log::File(a), Log::File(b)) => shares_rows(a, b, layout),
-        (Log::Arrays(a), Log::Arrays(b)) => a.sha256() == b.sha256(),
-        (Log::Reduced(a), Log::Reduced(b)) => a.shares_rows(b),
-        (Log::Reduced(part), log) | (log, Log::Reduced(part)) => log
-            .provenance()
-            .is_some_and(|p| p.shares_rows(&part.provenance)),
-        _ => false,
+fn note(first: &str, second: &str) -> StageNote {
+    StageNote::Log(LogNote::Repeated {
+        first: first.to_owned(),
+        second: second.to_owned(),
+    })
+}
+
+/// Places of each two of so many that are the same.
+fn pairs(
+    count: usize,
+    same: impl Fn(usize, usize) -> bool,
+) -> impl Iterator<Item = (usize, usize)> {
+    let places = (0..count).flat_map(|k| (0..k).map(move |i| (i, k)));
+    places.filter(move |(i, k)| same(*i, *k))
+}
+
+/// Name and span, for messages.
+fn shown_log(log: &Log) -> String {
+    match log {
+        Log::File(spec) => shown(spec),
+        log => escape(&log.name()),
     }
 }
 
-impl Log {
-    /// Name and span, for messages.
-    fn shown(&self) -> String {
-        match self {
-            Self::File(spec) => match spec.part() {
-                Some(span) => format!("{}@{span}", escape(&spec.name())),
-                None => escape(&spec.name()),
-            },
-            Self::Arrays(arrays) => escape(arrays.name()),
-            Self::Reduced(part) => match &part.provenance.span {
-                Some(span) => format!("{}@{span}", escape(part.name())),
-                None => escape(part.name()),
-            },
-        }
-    }
-
-    /// What distinguishes its rows from others, where it can be read.
-    fn provenance(&self) -> Option<Provenance> {
-        let (span, sha256) = match self {
-            Self::File(spec) => (spec.part(), sha256(&spec.path).ok()?),
-            Self::Arrays(arrays) => (None, arrays.sha256().to_owned()),
-            Self::Reduced(part) => return Some(part.provenance.clone()),
-        };
-        Some(Provenance {
-            name: self.name(),
-            span,
-            sha256,
-            samples: 0,
-            duration_s: 0.0,
-            role: None,
-        })
-    }
+/// Name and span of a file, for messages.
+fn shown(spec: &LogSpec) -> String {
+    let span = spec.part().map(|span| format!("@{span}"));
+    escape(&spec.name()) + &span.unwrap_or_default()
 }

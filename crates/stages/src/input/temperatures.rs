@@ -67,7 +67,7 @@ impl RobotSetup {
         log: &LogData,
         stretches: &mut [Stretch],
     ) -> Result<Option<StageNote>, LogError> {
-        match log.recording()?.temperatures() {
+        match log.recording().temperatures() {
             Ok(found) => {
                 for stretch in stretches {
                     stretch.temperature = found.along(&stretch.t, self.robot.joints());
@@ -102,8 +102,8 @@ impl RobotSetup {
         for EffectTemperature { effect, joint } in taken {
             let lacking = stretches.iter().find(|s| !s.has_temperature(*joint));
             if let Some(log) = lacking.and_then(|s| logs.get(s.log)) {
-                let error = log.recording().and_then(|of| of.temperatures()).err();
-                return Err(self.no_temperature(&log.source(), error, (effect, *joint)));
+                let error = log.recording().temperatures().err();
+                return Err(self.no_temperature(&log.source, error, (effect, *joint)));
             }
         }
         Ok(())
@@ -115,8 +115,8 @@ impl RobotSetup {
         model: &AugmentedModel,
         log: &LogData,
     ) -> Result<JointTemperatures, IdentifyError> {
-        let found = log.recording()?.temperatures().cloned();
-        self.temperatures_among(model, &log.source(), found)
+        let found = log.recording().temperatures().cloned();
+        self.temperatures_among(model, &log.source, found)
     }
 
     /// The same of a log that is read as its rows come, whose times count from `origin`.

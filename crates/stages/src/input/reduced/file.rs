@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::error::ReducedError;
 use super::factors::{ReducedFactors, ReducedHead};
 use super::reduced_log::{FrictionGiven, MadeWith, ReducedLog, ReducedLogs, ReducedRows};
-use crate::input::own_settings::{CutoffCosts, OwnSettings};
+use crate::input::log_smoothing::{CutoffCosts, LogSmoothing};
 use crate::note::StageNote;
 use cft_ident_core::motion::{SkippedStretches, Summary};
 use cft_ident_logs::log::{Provenance, REDUCED, begins_with, escape, sha256_of_bytes};
@@ -127,9 +127,9 @@ impl ReducedLogs {
             bounds_s: log.bounds_s,
             warnings: log.notes.iter().map(StageNote::to_string).collect(),
             summary: SummaryHead::of(&log.summary),
-            rest_speed: log.own.rest_speed.clone(),
-            cutoffs_hz: log.own.cutoffs_hz.clone(),
-            costs: log.own.costs.clone(),
+            rest_speed: log.smoothing.rest_speed.clone(),
+            cutoffs_hz: log.smoothing.cutoffs_hz.clone(),
+            costs: log.smoothing.costs.clone(),
             fastest: log.fastest.clone(),
             declared: log.readings.declared.head().clone(),
             narrower: log.readings.narrower.head().clone(),
@@ -268,7 +268,7 @@ fn read_log(made_with: &Arc<MadeWith>, head: LogHead, rest: &mut &[u8]) -> Optio
             .map(StageNote::OfReducedLog)
             .collect(),
         summary: head.summary.summary(),
-        own: OwnSettings {
+        smoothing: LogSmoothing {
             rest_speed: head.rest_speed,
             cutoffs_hz: head.cutoffs_hz,
             costs: head.costs,

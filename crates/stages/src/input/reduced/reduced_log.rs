@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ReducedError;
 use super::factors::ReducedFactors;
-use crate::input::own_settings::OwnSettings;
+use crate::input::log_smoothing::LogSmoothing;
 use crate::note::StageNote;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
@@ -146,7 +146,7 @@ pub struct ReducedLog {
     /// What was left out of it or mended, and what else was noticed of it, as a file keeps it.
     pub notes: Vec<StageNote>,
     pub summary: Summary,
-    pub(crate) own: OwnSettings,
+    pub(crate) smoothing: LogSmoothing,
     /// Greatest speed of each joint [m/s or rad/s].
     pub(crate) fastest: Vec<f64>,
     pub(crate) readings: ReducedRows,

@@ -9,7 +9,7 @@ use cft_ident_core::motion::position_cutoff::CutoffCost;
 
 /// What one log calls for.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct OwnSettings {
+pub(crate) struct LogSmoothing {
     /// Speed up to which each joint rests [m/s or rad/s].
     pub rest_speed: Vec<f64>,
     /// Cut-offs of the joints' position filters [Hz]; empty where they are not found from the log.
