@@ -91,9 +91,8 @@ pub fn friction(
         )?;
         let machine = &setup.data.setup;
         let settings = FrictionSettings { joint };
-        let mut found = identify::friction(&setup.data, &settings, control).map_err(of_stage)?;
-        setup.put_before(&mut found.setup, &mut found.notes);
-        let model = found.model(machine, old.as_ref());
+        let fitted = setup.friction(&settings, old.as_ref(), control);
+        let (found, model) = fitted.map_err(of_stage)?;
         let document = JsonDocument::new("friction", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::friction::friction(&stages::friction::Friction {
@@ -166,9 +165,7 @@ pub fn lsq(
             hold_friction,
             ..LsqSettings::default()
         };
-        let mut found = identify::lsq(&setup.data, &settings, control).map_err(of_stage)?;
-        setup.put_before(&mut found.setup, &mut found.notes);
-        let model = found.model(machine, friction.as_ref().map(|given| &given.file));
+        let (found, model) = setup.lsq(&settings, control).map_err(of_stage)?;
         let document = JsonDocument::new("lsq", &found.inputs, &found.notes, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::lsq::lsq(&stages::lsq::LsqReport {

@@ -195,7 +195,7 @@ fn of_robot(
     warnings: &mut Vec<String>,
     context: &Context,
 ) -> Result<Provenance, CliError> {
-    let mut reader = Reader::open(spec, &setup.file.layout())?;
+    let mut reader = Reader::open_until(spec, &setup.file.layout(), &|| context.interrupted())?;
     let joints = setup.robot.joint_names();
     let n = joints.len();
     let kinds = &["q", "tau", "dq"][..if reader.has_velocities() { 3 } else { 2 }];

@@ -93,7 +93,10 @@ impl Error for CliError {}
 
 impl From<LogError> for CliError {
     fn from(error: LogError) -> Self {
-        Self::new(Exit::BadInput, error)
+        match error {
+            LogError::Interrupted => Self::interrupted(),
+            error => Self::new(Exit::BadInput, error),
+        }
     }
 }
 

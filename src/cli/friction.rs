@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, paths_of, pictures,
-    setup, typed, written,
+    setup, typed,
 };
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{self, Dataset, FrictionSettings, RobotSetup};
+use cft_ident_stages::identify::{Dataset, FrictionSettings, RobotSetup};
 
 const EXAMPLE: &str = "\
 Example:
@@ -68,10 +68,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let robot = Path::new(&args.robot);
     let checked = setup::checked(data, (robot, &[]), &args.setup, context)?;
     let machine = &checked.setup.data.setup;
-    let mut found = identify::friction(&checked.setup.data, &settings, &context.control)?;
-    let setup = &checked.setup;
-    setup.put_before(&mut found.setup, &mut found.notes);
-    let model = found.model(machine, old.as_ref());
+    let control = &context.control;
+    let (found, model) = checked.setup.friction(&settings, old.as_ref(), control)?;
     let document = JsonDocument::new("friction", &found.inputs, &found.notes, &found)?;
     let of = stages::friction::Friction {
         setup: machine,
@@ -93,8 +91,5 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let figure = stages::friction::figure(machine, &found);
         context.write_picture(path, &figure.svg())?;
     }
-    checked.write(context)?;
-    files::write_model(&args.output, &model, context)?;
-    written(&mut report, &args.output);
-    Ok(Outcome::new(report.text_for(context.screen), document))
+    checked.finish(report, document, (&args.output, &model), context)
 }

@@ -104,6 +104,8 @@ struct IdentifyJob {
     shipped: Option<&'static str>,
     guesses: Vec<String>,
     warnings: Vec<String>,
+    /// Logs that were read already.
+    read: Vec<LogData>,
 }
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
@@ -158,6 +160,7 @@ impl IdentifyJob {
             shipped: None,
             guesses: Vec::new(),
             warnings,
+            read: Vec::new(),
         })
     }
 
@@ -195,17 +198,17 @@ impl IdentifyJob {
                 RobotSetup::new(&robot.to_string_lossy(), found.file)
             }
         };
-        Dataset::read(&setup, &logs_of(all), &context.control)?.check_moving()?;
+        let data = Dataset::read(&setup, &logs_of(all), &context.control)?;
+        data.check_moving()?;
         let logs = held_out::parted(all);
         if logs.validation.is_empty() {
             let text =
                 "no part of a log is held out: the error on data that were not fitted is not known";
             warnings.push(text.to_owned());
         }
-        let names = names_of(all).join(", ");
         let of = file_name(file);
         Ok(Self {
-            name: format!("{of} with {names}"),
+            name: format!("{of} with {}", names_of(all).join(", ")),
             campaign: CampaignFile {
                 robot: of,
                 truth: None,
@@ -222,6 +225,7 @@ impl IdentifyJob {
             shipped,
             guesses,
             warnings,
+            read: data.logs,
         })
     }
 }
@@ -274,7 +278,8 @@ fn execute(
     }
     let stages = context.stages(&STAGES);
     stages.begin("set-up");
-    let data = Dataset::read(&work.setup, &logs_of(&training), &context.control)?;
+    let control = &context.control;
+    let data = Dataset::read_beside(&work.setup, &logs_of(&training), &work.read, control)?;
     let checked = setup::checked(data, (&work.robot, &[]), &with_draft, context)?;
     warnings.extend(checked.setup.notes.iter().map(ToString::to_string));
     match (work.draft, &checked.new_file) {
@@ -303,13 +308,10 @@ fn execute(
         consistent: !campaign.settings.unconstrained,
         hold_friction: args.hold_friction,
     };
-    let control = &context.control;
-    let first = if one_joint.is_empty() {
-        "inertias"
-    } else {
-        "friction"
-    };
-    stages.begin(first);
+    stages.begin(match one_joint.is_empty() {
+        true => "inertias",
+        false => "friction",
+    });
     let found = identify::identify(&data, &settings, control, &mut |end| {
         match end {
             StageEnd::Friction(..) => stages.begin("inertias"),

@@ -4,15 +4,19 @@ use std::path::{Path, PathBuf};
 
 use super::held::{self, HeldRun};
 use super::known_payload::KnownPayload;
+use super::setup::CheckedDataset;
 use super::{
     CliError, Context, Outcome, arguments, files, logs, names_of, outputs, paths_of, pictures,
-    setup, typed, written,
+    setup, typed,
 };
+use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::campaign::EstimatorKind;
 use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::JsonDocument;
-use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{self, Dataset, LsqSettings, RobotSetup, refined};
+use cft_ident_report::report::sections::quality::InspectedLog;
+use cft_ident_report::report::stages::{self, lsq::LsqReport};
+use cft_ident_stages::identify::{self, CurrentGains, Dataset, LsqSettings, RobotSetup, refined};
+use cft_ident_stages::replay::ReplayedLogs;
 
 const EXAMPLE: &str = "\
 Example:
@@ -73,90 +77,107 @@ pub struct Args {
 
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if args.held {
-        let asked = HeldRun {
-            logs: &args.logs,
-            robot: &args.robot,
-            output: &args.output,
-            report: args.report.as_deref(),
-        };
-        return held::run(&asked, context);
+        return held::run(&args.held_run(), context);
     }
-    let payload = args.fit_gains.iter().flatten().map(|p| &*p.log.path);
-    let outputs = outputs::listed(Some(&args.output), &[], args.report.as_deref());
-    let outputs = outputs.chain(args.setup.fix_setup.as_deref());
-    context.check_outputs(paths_of(&args.logs).chain(payload), outputs)?;
+    args.check_outputs(context)?;
     let robot = files::robot(Path::new(&args.robot))?;
-    let machine = RobotSetup::new(&args.robot, robot.value);
-    let mut given = vec![robot.provenance];
-    let friction = files::friction("lsq", args.model.as_deref(), &machine.file, context)?;
-    given.extend(friction.iter().map(|model| model.provenance.clone()));
-    let known = friction.as_ref().map(|model| &model.value);
-    let data = Dataset::read(
-        &machine,
-        &logs(&args.leave_out.of(&args.logs))?,
-        &context.control,
-    )?;
-    data.check_moving()?;
-    let (data, gains, edits) = match &args.fit_gains {
-        None => (data, None, Vec::new()),
-        Some(payload) => {
-            let payload = payload.as_ref().map(KnownPayload::known);
-            let fitted = identify::fit_gains(&data, payload.as_ref(), &context.control)?;
-            let data = fitted.data(&data, &context.control)?;
-            (data, Some(fitted.gains), fitted.edits)
-        }
-    };
+    let friction = files::friction("lsq", args.model.as_deref(), &robot.value, context)?;
+    let (checked, gains) = args.checked(robot.value, context)?;
     let settings = LsqSettings {
         estimator: args.estimator,
         consistent: !args.unconstrained && args.open_loop.is_none(),
-        friction: known,
+        friction: friction.as_ref().map(|model| &model.value),
         hold_friction: args.hold_friction,
         open_loop: args.open_loop,
         gains: gains.as_ref(),
     };
-    let robot = Path::new(&args.robot);
-    let checked = setup::checked(data, (robot, &edits), &args.setup, context)?;
-    let data = &checked.setup.data;
-    let (machine, logs) = (&data.setup, &data.logs);
-    let mut found = identify::lsq(data, &settings, &context.control)?;
-    let setup = &checked.setup;
-    setup.put_before(&mut found.setup, &mut found.notes);
-    let mut model = found.model(machine, known.map(|given| &given.file));
+    let (found, mut model) = checked.setup.lsq(&settings, &context.control)?;
     if args.open_loop.is_some() && !args.unconstrained {
         identify::project(&mut model)?;
     }
     let document = JsonDocument::new("lsq", &found.inputs, &found.notes, &found)?;
-    let names = names_of(&args.logs);
-    let of = stages::lsq::LsqReport {
-        setup: machine,
+    let of = LsqReport {
+        setup: &checked.setup.data.setup,
         found: &found,
         file: &model,
         path: &typed::quoted(&args.output.to_string_lossy()),
-        logs: &names,
+        logs: &names_of(&args.logs),
         typed: &typed_logs(&args.logs),
     };
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
-        let smoothed = machine.smoothed_as(&found.position_cutoffs);
-        let in_memory = match data.reduced.is_empty() {
-            false => None,
-            true => pictures::in_memory(&smoothed, logs, context)?,
-        };
-        let numbers = refined(&model, &args.output.to_string_lossy())?;
-        let of_model = (&model, &numbers);
-        let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &names, of_model, &[])?;
-        let files = args.logs.iter().filter(|l| !identify::is_reduced(&l.path));
-        let quality = pictures::inspected(files, machine, context)?;
-        let (mut page, replayed) = (report.page(), replayed.as_ref());
-        stages::lsq::pictures(&mut page, &of, replayed, &given, &quality, &context.command);
-        context.check()?;
+        let mut given = vec![robot.provenance];
+        given.extend(friction.map(|model| model.provenance));
+        let (replayed, quality) = args.replayed(&of, &checked.setup.data, context)?;
+        let (page, replayed) = (&mut report.page(), replayed.as_ref());
+        stages::lsq::pictures(page, &of, replayed, &given, &quality, &context.command);
         context.write_text(path, &report.html())?;
     }
-    context.check()?;
-    checked.write(context)?;
-    files::write_model(&args.output, &model, context)?;
-    written(&mut report, &args.output);
-    Ok(Outcome::new(report.text_for(context.screen), document))
+    checked.finish(report, document, (&args.output, &model), context)
+}
+
+impl Args {
+    fn held_run(&self) -> HeldRun<'_> {
+        HeldRun {
+            logs: &self.logs,
+            robot: &self.robot,
+            output: &self.output,
+            report: self.report.as_deref(),
+        }
+    }
+
+    fn check_outputs(&self, context: &Context) -> Result<(), CliError> {
+        let payload = self.fit_gains.iter().flatten().map(|p| &*p.log.path);
+        let outputs = outputs::listed(Some(&self.output), &[], self.report.as_deref());
+        let outputs = outputs.chain(self.setup.fix_setup.as_deref());
+        context.check_outputs(paths_of(&self.logs).chain(payload), outputs)
+    }
+
+    /// The logs as the robot file reads them, with the gains of its torque channels where those are fitted.
+    fn checked(
+        &self,
+        file: RobotFile,
+        context: &Context,
+    ) -> Result<(CheckedDataset, Option<CurrentGains>), CliError> {
+        let control = &context.control;
+        let setup = RobotSetup::new(&self.robot, file);
+        let logs = logs(&self.leave_out.of(&self.logs))?;
+        let data = Dataset::read(&setup, &logs, control)?;
+        data.check_moving()?;
+        let (data, gains, edits) = match &self.fit_gains {
+            None => (data, None, Vec::new()),
+            Some(payload) => {
+                let payload = payload.as_ref().map(KnownPayload::known);
+                let fitted = identify::fit_gains(&data, payload.as_ref(), control)?;
+                let data = fitted.data(&data, control)?;
+                (data, Some(fitted.gains), fitted.edits)
+            }
+        };
+        let robot = Path::new(&self.robot);
+        let checked = setup::checked(data, (robot, &edits), &self.setup, context)?;
+        Ok((checked, gains))
+    }
+
+    /// The model along the logs, where they fit into memory, and what is wrong with them.
+    fn replayed(
+        &self,
+        of: &LsqReport,
+        data: &Dataset,
+        context: &Context,
+    ) -> Result<(Option<ReplayedLogs>, Vec<InspectedLog>), CliError> {
+        let smoothed = data.setup.smoothed_as(&of.found.position_cutoffs);
+        let in_memory = match data.reduced.is_empty() {
+            true => pictures::in_memory(&smoothed, &data.logs, context)?,
+            false => None,
+        };
+        let numbers = refined(of.file, &self.output.to_string_lossy())?;
+        let of_model = (of.file, &numbers);
+        let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), of.logs, of_model, &[])?;
+        let files = self.logs.iter().filter(|l| !identify::is_reduced(&l.path));
+        let quality = pictures::inspected(files, &data.setup, context)?;
+        context.check()?;
+        Ok((replayed, quality))
+    }
 }
 
 /// Logs as a shell takes them; of many, and of reduced ones, which hold no rows to diagnose, a word.

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context};
+use super::{CliError, Context, Outcome, files, written};
 use cft_ident_files::config::correction::{KeyEdit, edited};
-use cft_ident_files::config::{self, RobotFile};
+use cft_ident_files::config::{self, ModelFile, RobotFile};
+use cft_ident_report::report::Report;
+use cft_ident_report::report::json::JsonDocument;
 use cft_ident_stages::identify::{
     AcceptedSetup, ContradictedSetup, Dataset, SetupRefusal, accepted_setup,
     check_setup_where_possible,
@@ -30,6 +32,21 @@ pub struct CheckedDataset {
 }
 
 impl CheckedDataset {
+    /// Writes the model that a command made of the logs, and the new robot file, and hands over its result.
+    pub fn finish(
+        &self,
+        mut report: Report,
+        document: JsonDocument,
+        (path, model): (&Path, &ModelFile),
+        context: &Context,
+    ) -> Result<Outcome, CliError> {
+        context.check()?;
+        self.write(context)?;
+        files::write_model(path, model, context)?;
+        written(&mut report, path);
+        Ok(Outcome::new(report.text_for(context.screen), document))
+    }
+
     /// Writes the new robot file, where there is one, and says so.
     pub fn write(&self, context: &Context) -> Result<(), CliError> {
         if let Some((path, text)) = &self.new_file {

@@ -121,8 +121,8 @@ const DOORS: &[(&str, &str)] = &[
     ("exmex", "math/formula.rs"),
     ("fast_float2", "log/text/number.rs"),
     // one to read, one to write
-    ("mcap", "log/recording/format/mcap.rs|output/mcap.rs"),
-    ("rusqlite", "log/recording/format/bag.rs"),
+    ("mcap", "log/messages/format/mcap.rs|output/mcap.rs"),
+    ("rusqlite", "log/messages/format/bag.rs"),
     (
         "flate2",
         "log/content.rs|log/table/zip.rs|log/table/mat.rs|output/log.rs|input/reduced/file.rs",

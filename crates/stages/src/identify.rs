@@ -67,7 +67,7 @@ pub use crate::held_out::validate::{
 pub use crate::input::control::{Control, Progress};
 pub use crate::input::curve::friction_curve;
 pub use crate::input::dataset::{Dataset, GivenModel};
-pub use crate::input::error::{IdentifyError, ReadError};
+pub use crate::input::error::IdentifyError;
 pub use crate::input::error_kind::ErrorKind;
 pub use crate::input::gain_error::GainError;
 pub use crate::input::in_memory::{InMemory, read_whole};

@@ -198,7 +198,7 @@ pub fn watch(
         RowSource::Log(log) => {
             let reader = match json_lines(&log) {
                 Some(file) => Reader::of_stream(&log.name(), file, &layout)?,
-                None => log.reader(&layout, setup.robot.joint_names())?,
+                None => log.reader(&layout, setup.robot.joint_names(), control)?,
             };
             warm = takes.then(|| log.clone());
             (reader, log.name())

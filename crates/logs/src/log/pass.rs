@@ -62,10 +62,11 @@ impl LogPass {
         spec: &LogSpec,
         layout: &Layout,
         strictness: RowStrictness,
+        stop: &dyn Fn() -> bool,
     ) -> Result<Self, LogError> {
         let files = spec.files()?;
         if strictness == RowStrictness::Refuse && !layout.joints.is_empty() {
-            let store = Arc::new(RowStore::read(&files, layout, &|| false)?);
+            let store = Arc::new(RowStore::read(&files, layout, stop)?);
             return Self::along(spec, &store, layout);
         }
         Self::of_files(spec, files, layout, strictness)

@@ -99,7 +99,7 @@ impl RawReader {
         let Some(layout) = layout else {
             return Self::open_plain(spec, &LogSection::default());
         };
-        let pass = LogPass::open(spec, layout, RowStrictness::Record)?;
+        let pass = LogPass::open(spec, layout, RowStrictness::Record, &|| false)?;
         let words = vec![0; pass.rows.names().len()];
         Ok(Self {
             pass,

@@ -50,7 +50,19 @@ impl Reader {
     /// # Errors
     /// A file that cannot be read, is no log, or lacks a channel of the layout.
     pub fn open(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        LogPass::open(spec, layout, RowStrictness::Refuse).map(Self::new)
+        Self::open_until(spec, layout, &|| false)
+    }
+
+    /// The same; where `stop` says so while the log is parsed, that ends with [`LogError::Interrupted`].
+    ///
+    /// # Errors
+    /// Those of [`Reader::open`], and interruption.
+    pub fn open_until(
+        spec: &LogSpec,
+        layout: &Layout,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Self, LogError> {
+        LogPass::open(spec, layout, RowStrictness::Refuse, stop).map(Self::new)
     }
 
     /// Goes along rows that were parsed.

@@ -36,7 +36,7 @@ impl JointTemperatures {
             span: Span::Whole,
             ..spec.clone()
         };
-        let mut pass = LogPass::open(&whole, layout, RowStrictness::Refuse)?;
+        let mut pass = LogPass::open(&whole, layout, RowStrictness::Refuse, &|| false)?;
         let mut courses = vec![LoggedTemperature::default(); joints.len()];
         let mut row = Block::default();
         while let Some(t) = pass.next()? {

@@ -40,6 +40,17 @@ fn layout() -> Layout {
     Layout::joint_columns(&["q1"])
 }
 
+#[test]
+fn a_log_is_parsed_no_further_where_reading_is_to_end() {
+    let folder = Folder::new();
+    let rows = (0..20_000).map(|k| format!("{},{k},1\n", f64::from(k) / 100.0));
+    let path = folder.file(format!("t,q_q1,tau_q1\n{}", rows.collect::<String>()));
+    let spec = path.to_string_lossy().parse::<LogSpec>().unwrap();
+    let ended = Reader::open_until(&spec, &layout(), &|| true);
+    assert!(matches!(ended, Err(LogError::Interrupted)));
+    assert!(Reader::open_until(&spec, &layout(), &|| false).is_ok());
+}
+
 #[track_caller]
 fn refused(spec: &str, layout: &Layout, words: &[&str]) {
     log_support::says(&read(spec, layout).unwrap_err().to_string(), words);

@@ -1,14 +1,18 @@
 //! The check of a set-up before a fit, and what the fit goes on with.
 
 use super::check_setup::check_setup_where_possible;
+use crate::fit::dynamics::IdentifiedDynamics;
+use crate::fit::friction::{FrictionSettings, IdentifiedFriction, friction};
+use crate::fit::lsq::lsq;
+use crate::fit::lsq_problem::LsqSettings;
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{SetupNote, StageNote};
 use crate::setup::{Finding, FindingSeverity, SetupReport};
-use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::correction::KeyEdit;
+use cft_ident_files::config::{ModelFile, RobotFile};
 
 /// A set-up that a fit goes on with.
 pub struct AcceptedSetup {
@@ -72,8 +76,40 @@ pub fn accepted_setup(data: Dataset, control: &Control) -> Result<AcceptedSetup,
 }
 
 impl AcceptedSetup {
+    /// [`lsq`], what the check found before what the fit found, and the model that it is.
+    ///
+    /// # Errors
+    /// Those of [`lsq`].
+    pub fn lsq(
+        &self,
+        settings: &LsqSettings,
+        control: &Control,
+    ) -> Result<(IdentifiedDynamics, ModelFile), IdentifyError> {
+        let mut found = lsq(&self.data, settings, control)?;
+        self.put_before(&mut found.setup, &mut found.notes);
+        let friction = settings.friction.map(|given| &given.file);
+        let model = found.model(&self.data.setup, friction);
+        Ok((found, model))
+    }
+
+    /// [`friction`] in the same way; joints that these logs do not move are those of `old`.
+    ///
+    /// # Errors
+    /// Those of [`friction`].
+    pub fn friction(
+        &self,
+        settings: &FrictionSettings,
+        old: Option<&ModelFile>,
+        control: &Control,
+    ) -> Result<(IdentifiedFriction, ModelFile), IdentifyError> {
+        let mut found = friction(&self.data, settings, control)?;
+        self.put_before(&mut found.setup, &mut found.notes);
+        let model = found.model(&self.data.setup, old);
+        Ok((found, model))
+    }
+
     /// Puts what the check found before what a fit found and noticed.
-    pub fn put_before(&self, findings: &mut Vec<Finding>, notes: &mut Vec<StageNote>) {
+    fn put_before(&self, findings: &mut Vec<Finding>, notes: &mut Vec<StageNote>) {
         findings.splice(0..0, self.report.findings.iter().cloned());
         notes.splice(0..0, self.notes.iter().cloned());
     }

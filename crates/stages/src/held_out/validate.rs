@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::open_loop::{free_run, open_loop};
+use super::reduced_logs::check_smoothed_alike;
 use crate::band::{Band, Reach};
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
@@ -12,20 +13,12 @@ use crate::input::in_memory::read_whole;
 use crate::input::model::refined;
 use crate::input::of_robot::{JointRanges, TorquePeaks};
 use crate::input::position_cutoff::known;
-use crate::input::reduced::error::ReducedError;
-use crate::input::reduced::reduced_log::ReducedLog;
 use crate::input::repeated::{fitted_identities, repeated_rows, used_for};
-use crate::input::robot_setup::RobotSetup;
-use crate::input::unknowns::columns;
 use crate::note::{ModelNote, StageNote};
 use crate::open_loop::{FreeRun, OpenLoop};
 use cft_ident_core::effect::AugmentedModel;
-use cft_ident_core::inertia::columns::JointTerm;
-use cft_ident_core::number;
-use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::validate::{
-    HalfWidths, JointError, ReconstructedRow, SummedRows, TorqueErrors, TorqueReconstruction,
-    TorqueValidation,
+    HalfWidths, JointError, ReconstructedRow, TorqueErrors, TorqueReconstruction, TorqueValidation,
 };
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Instant, Provenance};
@@ -158,7 +151,7 @@ fn errors_of(
 ) -> Result<Validated, IdentifyError> {
     let data = &smoothed(data, refined, control)?;
     let setup = &data.setup;
-    smoothed_alike(data)?;
+    check_smoothed_alike(data)?;
     let of_model = (refined, file);
     // a band is of single rows, which a reduced log has not
     let rows = data.reduced.is_empty();
@@ -221,37 +214,6 @@ pub fn not_a_validation(errors: &TorqueErrors) -> Option<StageNote> {
     }))
 }
 
-/// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
-fn smoothed_alike(data: &Dataset) -> Result<(), IdentifyError> {
-    let (setup, parts) = (&data.setup, &data.reduced);
-    let Some(first) = parts.first().filter(|_| setup.finds_cutoffs()) else {
-        return Ok(());
-    };
-    let together = match data.logs.is_empty() {
-        true => &first.smoothing.cutoffs_hz,
-        false => &*setup.position_cutoffs_hz,
-    };
-    for part in parts {
-        let own = &part.smoothing.cutoffs_hz;
-        let differs = |(_, (a, b)): &(usize, (&f64, &f64))| a != b;
-        let joint = own.iter().zip(together).enumerate().find(differs);
-        if let Some((j, (own, other))) = joint {
-            return Err(ReducedError::NeedsLog {
-                log: part.name().to_owned(),
-                what: format!(
-                    "{} as smoothed as the other logs (by {} Hz, and they by {} Hz): its own rows chose it",
-                    setup.robot.joint_names()[j],
-                    number::significant(*own, 3),
-                    number::significant(*other, 3),
-                ),
-                remedy: "declare `position_cutoff_hz` in [filter] and reduce again, validate them one by one, or give the logs themselves",
-            }
-            .into());
-        }
-    }
-    Ok(())
-}
-
 /// The data with the position cut-offs that the logs call for, by the friction of a model.
 fn smoothed(
     data: &Dataset,
@@ -289,7 +251,7 @@ fn reconstruct(
     let settings = setup.settings();
     let mut segments = 0;
     for part in &data.reduced {
-        add_reduced(&mut all, setup, refined, part)?;
+        part.add_errors(&mut all, setup, refined)?;
         notes.extend(part.notes.iter().cloned());
         inputs.push(part.provenance.clone());
         last = Some(part.summary.clone());
@@ -360,69 +322,4 @@ fn reconstruct(
     };
     found.every().for_each(|errors| setup.name_units(errors));
     Ok(found)
-}
-
-/// Adds the errors of a model that is linear in the columns of a reduced log.
-fn add_reduced(
-    all: &mut TorqueReconstruction,
-    setup: &RobotSetup,
-    refined: &AugmentedModel,
-    part: &ReducedLog,
-) -> Result<(), IdentifyError> {
-    let needs = |what: &str, remedy| ReducedError::NeedsLog {
-        log: part.name().to_owned(),
-        what: what.to_owned(),
-        remedy,
-    };
-    let model = &refined.model;
-    if !refined.effects.is_empty() {
-        let what = "the rows that effects are computed along";
-        return Err(needs(what, "give the log itself, or a model without effects").into());
-    }
-    part.belongs_to_robot(&setup.file)?;
-    let known = part.known_friction();
-    let columns = columns(setup, known.as_deref());
-    for (j, friction) in model.friction.iter().enumerate() {
-        let same = match (friction, columns.known[j].as_ref()) {
-            (JointFriction::DoubleTanh(law), Some(known)) => {
-                law.parameters() == known.law.parameters()
-            }
-            (JointFriction::ViscousCoulomb(_) | JointFriction::None, None) => true,
-            _ => false,
-        };
-        if !same {
-            let what = "the friction of this model: its columns were made with another";
-            let remedy = "reduce the log again with `-m` and this model, or give the log itself";
-            return Err(needs(what, remedy).into());
-        }
-    }
-    let mut theta = model.theta.clone();
-    for (j, own) in columns.own.iter().enumerate() {
-        let viscous_coulomb = match &model.friction[j] {
-            JointFriction::ViscousCoulomb(law) => [law.viscous, law.coulomb],
-            _ => [0.0, 0.0],
-        };
-        theta.extend(own.iter().map(|own| match own {
-            JointTerm::Viscous => viscous_coulomb[0],
-            JointTerm::Coulomb => viscous_coulomb[1],
-            JointTerm::Offset => model.offset[j],
-            JointTerm::Saturating(_)
-            | JointTerm::Law(_)
-            | JointTerm::TorqueRate
-            | JointTerm::TorqueBend => 0.0,
-        }));
-    }
-    let rows = part.rows(columns)?;
-    for (j, sums) in rows.squares(&theta.into()).into_iter().enumerate() {
-        let [moving, resting] = [rows.moving[j], rows.resting[j]];
-        all.add_sums(
-            j,
-            &SummedRows {
-                error: sums,
-                torque: [moving.torque_square, resting.torque_square],
-                rows: [moving.count, resting.count],
-            },
-        );
-    }
-    Ok(())
 }

@@ -8,7 +8,6 @@ use super::error::IdentifyError;
 use super::log::{Log, without_rows};
 use super::log_data::{LogData, raise};
 use super::model::refined;
-use super::reduced::error::ReducedError;
 use super::reduced::reduced_log::ReducedLog;
 use super::robot_setup::RobotSetup;
 use cft_ident_core::effect::AugmentedModel;
@@ -39,6 +38,19 @@ impl Dataset {
         logs: &[Log],
         control: &Control,
     ) -> Result<Self, IdentifyError> {
+        Self::read_beside(setup, logs, &[], control)
+    }
+
+    /// The same; what one of the logs beside holds is not parsed again.
+    ///
+    /// # Errors
+    /// Logs that cannot be read.
+    pub fn read_beside(
+        setup: &RobotSetup,
+        logs: &[Log],
+        beside: &[LogData],
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
         let (mut with_rows, mut reduced) = (Vec::new(), Vec::new());
         for log in logs {
             match log {
@@ -46,7 +58,7 @@ impl Dataset {
                 log => with_rows.push(log.clone()),
             }
         }
-        let logs = LogData::read_all(setup, &with_rows, &[], control)?;
+        let logs = LogData::read_all(setup, &with_rows, &[beside], control)?;
         Ok(Dataset {
             reduced,
             ..Self::new(setup, &logs)
@@ -126,15 +138,10 @@ impl Dataset {
     /// # Errors
     /// The first reduced log.
     pub(crate) fn needs_rows(&self, what: &str, remedy: &'static str) -> Result<(), IdentifyError> {
-        let Some(part) = self.reduced.first() else {
-            return Ok(());
-        };
-        Err(ReducedError::NeedsLog {
-            log: part.name().to_owned(),
-            what: what.to_owned(),
-            remedy,
+        match self.reduced.first() {
+            Some(part) => Err(part.needs_log(what, remedy).into()),
+            None => Ok(()),
         }
-        .into())
     }
 
     /// Greatest speed of every joint in the logs that are fitted [m/s or rad/s].

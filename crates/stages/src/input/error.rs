@@ -20,7 +20,7 @@ use cft_ident_logs::log::{LogError, did_you_mean, escape};
 #[derive(Debug, Explain, thiserror::Error)]
 pub enum IdentifyError {
     #[explain(_0.explanation())]
-    Log(#[from] LogError),
+    Log(#[source] LogError),
     #[explain(_0.explanation())]
     Config(#[from] ConfigError),
     #[explain(_0.explanation())]
@@ -285,7 +285,7 @@ impl IdentifyError {
     }
 
     /// What ended a run through a log.
-    pub fn of_run(log: &str, error: RunError<ReadError>) -> Self {
+    pub fn of_run(log: &str, error: RunError<LogError>) -> Self {
         match error {
             RunError::Source(error) => error.into(),
             RunError::Motion(error) => Self::motion(log, error),
@@ -293,20 +293,11 @@ impl IdentifyError {
     }
 }
 
-/// What stops the reading of a log.
-#[derive(Debug, Explain, thiserror::Error)]
-pub enum ReadError {
-    #[explain(_0.explanation())]
-    Log(#[from] LogError),
-    #[explain("interrupted")]
-    Interrupted,
-}
-
-impl From<ReadError> for IdentifyError {
-    fn from(error: ReadError) -> Self {
+impl From<LogError> for IdentifyError {
+    fn from(error: LogError) -> Self {
         match error {
-            ReadError::Log(error) => Self::Log(error),
-            ReadError::Interrupted => Self::Interrupted,
+            LogError::Interrupted => Self::Interrupted,
+            error => Self::Log(error),
         }
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use super::control::Control;
 use super::reduced::reduced_log::ReducedLog;
 use cft_ident_logs::log::{Layout, LogArrays, LogError, LogSpec, Reader, escape};
 
@@ -92,9 +93,14 @@ impl Log {
     }
 
     /// Goes along its rows as they come, neither looked at nor mended.
-    pub(crate) fn reader(&self, layout: &Layout, joints: &[String]) -> Result<Reader, LogError> {
+    pub(crate) fn reader(
+        &self,
+        layout: &Layout,
+        joints: &[String],
+        control: &Control,
+    ) -> Result<Reader, LogError> {
         match self {
-            Self::File(spec) => Reader::open(spec, layout),
+            Self::File(spec) => Reader::open_until(spec, layout, &|| control.stopped()),
             Self::Reduced(part) => Err(without_rows(part)),
             Self::Arrays(arrays) => Reader::of_arrays(arrays, arrays_layout(layout, joints)),
         }

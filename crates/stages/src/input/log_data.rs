@@ -9,7 +9,7 @@ use super::log::{Log, arrays_layout, without_rows};
 use super::open_log::OpenLog;
 use super::reference::LoggedReference;
 use super::robot_setup::RobotSetup;
-use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
+use cft_ident_logs::log::{Layout, RowFault, escape};
 use cft_ident_logs::recording::{Recording, RecordingRequest, TorqueCourse};
 
 /// A log that was read.
@@ -103,12 +103,8 @@ impl LogData {
             Log::Arrays(arrays) => Recording::of_arrays(arrays, &request),
             Log::Reduced(part) => Err(without_rows(part)),
         };
-        let read = read.map_err(|error| match error {
-            LogError::Interrupted => IdentifyError::Interrupted,
-            error => error.into(),
-        })?;
         let longest = |dt: f64| setup.settings().longest_step(dt);
-        let mut read = read.cut_by(&longest);
+        let mut read = read?.cut_by(&longest);
         if setup.file.zero_order_hold(read.layout().channels) {
             read = read.held_by(setup.robot.clone());
         }

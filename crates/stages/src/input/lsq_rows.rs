@@ -35,16 +35,16 @@ pub(crate) enum PositionReading {
     Again(u32),
 }
 
-/// Rows of one log.
+/// What the rows of a log are folded from: themselves, or sums of them that were kept.
 #[derive(Clone, Copy)]
-enum RowSource<'a> {
-    Recorded(&'a LogData),
-    Reduced(&'a ReducedLog),
+enum RowOrigin<'a> {
+    Log(&'a LogData),
+    Sums(&'a ReducedLog),
 }
 
 /// A log whose rows are folded.
 struct FoldedLog<'a> {
-    rows: RowSource<'a>,
+    rows: RowOrigin<'a>,
     /// What it calls for by itself; none where the robot file and the columns say it.
     smoothing: Option<LogSmoothing>,
     /// What was seen of it when its rows were folded for the first time.
@@ -87,8 +87,8 @@ impl<'a> LsqRows<'a> {
         smoothing: Vec<LogSmoothing>,
         control: &'a Control,
     ) -> Self {
-        let reduced = data.reduced.iter().map(|part| RowSource::Reduced(part));
-        let recorded = data.logs.iter().map(RowSource::Recorded);
+        let reduced = data.reduced.iter().map(|part| RowOrigin::Sums(part));
+        let recorded = data.logs.iter().map(RowOrigin::Log);
         let each = reduced.chain(recorded).zip(smoothing);
         let each = each.map(|(rows, smoothing)| (rows, Some(smoothing)));
         Self::of_each(&data.setup, each, control)
@@ -100,7 +100,7 @@ impl<'a> LsqRows<'a> {
         logs: &'a [LogData],
         control: &'a Control,
     ) -> Self {
-        let rows = logs.iter().map(|log| (RowSource::Recorded(log), None));
+        let rows = logs.iter().map(|log| (RowOrigin::Log(log), None));
         Self::of_each(setup, rows, control)
     }
 
@@ -110,13 +110,13 @@ impl<'a> LsqRows<'a> {
         part: &'a ReducedLog,
         control: &'a Control,
     ) -> Self {
-        let rows = std::iter::once((RowSource::Reduced(part), None));
+        let rows = std::iter::once((RowOrigin::Sums(part), None));
         Self::of_each(setup, rows, control)
     }
 
     fn of_each(
         setup: &'a RobotSetup,
-        rows: impl Iterator<Item = (RowSource<'a>, Option<LogSmoothing>)>,
+        rows: impl Iterator<Item = (RowOrigin<'a>, Option<LogSmoothing>)>,
         control: &'a Control,
     ) -> Self {
         let log = |(rows, smoothing)| FoldedLog {
@@ -163,7 +163,7 @@ impl<'a> LsqRows<'a> {
     pub(crate) fn jumps(&self) -> Vec<(&LogData, &ResidualJump)> {
         let mut all = Vec::new();
         for log in &self.logs {
-            if let (RowSource::Recorded(data), Some(seen)) = (log.rows, &log.seen) {
+            if let (RowOrigin::Log(data), Some(seen)) = (log.rows, &log.seen) {
                 all.extend(seen.jumps.iter().map(|jump| (data, jump)));
             }
         }
@@ -174,14 +174,14 @@ impl<'a> LsqRows<'a> {
     pub(crate) fn recorded(&self) -> impl Iterator<Item = (usize, &LogData)> {
         let logs = self.logs.iter().enumerate();
         logs.filter_map(|(place, log)| match log.rows {
-            RowSource::Recorded(data) => Some((place, data)),
-            RowSource::Reduced(_) => None,
+            RowOrigin::Log(data) => Some((place, data)),
+            RowOrigin::Sums(_) => None,
         })
     }
 
     /// Samples at standstill of these joints count from here on; not where logs were reduced without them.
     pub(crate) fn count_rests(&mut self, joints: &[usize]) -> bool {
-        let of_reduced = |log: &FoldedLog| matches!(log.rows, RowSource::Reduced(_));
+        let of_reduced = |log: &FoldedLog| matches!(log.rows, RowOrigin::Sums(_));
         let whole = !self.logs.iter().any(of_reduced);
         if whole {
             self.counted = joints.to_vec();
@@ -192,8 +192,8 @@ impl<'a> LsqRows<'a> {
     /// Whether rows by the narrower filter can have the rates of torques among their columns.
     pub(crate) fn have_torque_rates(&self) -> bool {
         self.logs.iter().all(|log| match log.rows {
-            RowSource::Reduced(part) => part.holds_torque_rates(),
-            RowSource::Recorded(_) => true,
+            RowOrigin::Sums(part) => part.holds_torque_rates(),
+            RowOrigin::Log(_) => true,
         })
     }
 
@@ -292,8 +292,8 @@ impl<'a> LsqRows<'a> {
         for log in 0..self.logs.len() {
             let columns = self.columns_of(log, columns);
             let sums = match self.logs[log].rows {
-                RowSource::Reduced(part) => self.fold_reduced(log, part, (reading, columns))?,
-                RowSource::Recorded(data) => {
+                RowOrigin::Sums(part) => self.fold_reduced(log, part, (reading, columns))?,
+                RowOrigin::Log(data) => {
                     let weigher = weigher.as_deref_mut();
                     self.fold_recorded(log, data, (reading, &columns), weigher)?
                 }

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::control::Control;
-use super::error::{IdentifyError, ReadError};
+use super::error::IdentifyError;
 use crate::note::{LogNote, RowLoss, StageNote};
 use cft_ident_core::motion::{MotionError, RunError, Stretch, Summary};
-use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader, escape};
+use cft_ident_logs::log::{Block, Instant, Layout, LogError, Provenance, Reader, escape};
 use cft_ident_logs::recording::{Recording, RowBlocks};
 
 /// A velocity column is off by more than filters and steps make of it.
@@ -40,10 +40,10 @@ impl<'a> OpenLog<'a> {
     }
 
     /// The next block, without the rows that are marked bad; false at the end.
-    pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
+    pub fn read(&mut self, block: &mut Block) -> Result<bool, LogError> {
         loop {
             if self.control.stopped() {
-                return Err(ReadError::Interrupted);
+                return Err(LogError::Interrupted);
             }
             let more = self.blocks.read(block)?;
             if !more || !block.is_empty() {
@@ -157,7 +157,7 @@ impl<'a> OpenLog<'a> {
     }
 
     /// What ended a run through it, with what was left out where too little remained.
-    pub(crate) fn ended(&self, error: RunError<ReadError>) -> IdentifyError {
+    pub(crate) fn ended(&self, error: RunError<LogError>) -> IdentifyError {
         match error {
             RunError::Source(error) => error.into(),
             RunError::Motion(error) => IdentifyError::Motion {

@@ -1,7 +1,6 @@
 //! The references of a log beside its positions, row by row.
 
-use super::error::ReadError;
-use cft_ident_logs::log::{Block, Reader};
+use cft_ident_logs::log::{Block, LogError, Reader};
 
 /// A second reading of a log, of the positions that the controller was asked for.
 pub struct LoggedReference {
@@ -25,7 +24,7 @@ impl LoggedReference {
     }
 
     /// Puts the reference beside the positions of a block, and torques of 0 beside the torques.
-    pub fn widen(&mut self, block: &mut Block) -> Result<(), ReadError> {
+    pub fn widen(&mut self, block: &mut Block) -> Result<(), LogError> {
         let n = block.joints();
         self.wide.clear();
         for k in 0..block.len() {
@@ -43,7 +42,7 @@ impl LoggedReference {
     }
 
     /// Goes on to the last row that is not after t; the first row before that.
-    fn advance(&mut self, t: f64) -> Result<(), ReadError> {
+    fn advance(&mut self, t: f64) -> Result<(), LogError> {
         loop {
             if self.row == self.block.len() {
                 self.block.clear();

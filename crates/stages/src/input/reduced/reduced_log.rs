@@ -182,6 +182,15 @@ impl ReducedLog {
         &self.provenance.name
     }
 
+    /// Refuses it for `what`, which needs its rows.
+    pub(crate) fn needs_log(&self, what: &str, remedy: &'static str) -> ReducedError {
+        ReducedError::NeedsLog {
+            log: self.name().to_owned(),
+            what: what.to_owned(),
+            remedy,
+        }
+    }
+
     /// Blocks of time whose factors are kept.
     pub fn blocks(&self) -> usize {
         self.readings.declared.blocks()
