@@ -115,10 +115,12 @@ pub fn validate(
     let logs = data.logs.as_slice();
     let refined = &settings.model.numbers()?;
     let mut found = errors_of(data, (refined, &settings.model.file), control, row)?;
-    if settings.free_run {
+    // a motion begins in a row
+    if settings.free_run && data.reduced.is_empty() {
         found.free_run = free_run(&data.setup, refined, (logs, &found.inputs), control)?;
     }
     if let Some(window) = settings.open_loop {
+        data.check_rows()?;
         let simulated = open_loop(&data.setup, refined, logs, window, control)?;
         if simulated.astray > 0 {
             found.notes.push(StageNote::Model(ModelNote::Astray {
