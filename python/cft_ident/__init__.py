@@ -400,9 +400,9 @@ class Model:
         rows = self._native.parameters
         return np.array([in_use for _, joint, _, _, in_use, _ in rows if joint is None])
 
-    def to_urdf(self, path: PathLike) -> Result:
-        """Write the model as URDF, with a model file of the rest beside it."""
-        return export(self, urdf=path)
+    def to_urdf(self, path: PathLike, source: PathLike | None = None) -> Result:
+        """Write the model as URDF, with a model file of the rest beside it; ``source`` is one whose meshes are kept."""
+        return export(self, urdf=path, urdf_source=source)
 
     def to_c(self, path: PathLike) -> Result:
         """Write the model as a C99 header."""
@@ -416,9 +416,9 @@ class Model:
         """Write gains of ros2_control's joint_trajectory_controller for joints that take efforts."""
         return export(self, ros2_control=path)
 
-    def to_mjcf(self, path: PathLike) -> Result:
-        """Write the model for MuJoCo."""
-        return export(self, mjcf=path)
+    def to_mjcf(self, path: PathLike, source: PathLike | None = None) -> Result:
+        """Write the model for MuJoCo; ``source`` is an MJCF whose geoms and meshes are kept."""
+        return export(self, mjcf=path, mjcf_source=source)
 
     def to_sdf(self, path: PathLike) -> Result:
         """Write the model for Gazebo."""
@@ -752,18 +752,21 @@ def new(name: PathLike, *, urdf: PathLike | None = None, log: PathLike | None = 
 
 def export(model: Model | PathLike, *, urdf: PathLike | None = None, c: PathLike | None = None,
            rust: PathLike | None = None, mjcf: PathLike | None = None, sdf: PathLike | None = None,
-           usd: PathLike | None = None, ros2_control: PathLike | None = None,
+           usd: PathLike | None = None, ros2_control: PathLike | None = None, urdf_source: PathLike | None = None,
+           mjcf_source: PathLike | None = None, mujoco_damping: bool = False,
            logs: PathLike | Iterable[PathLike] = ()) -> Result:
     """Write a model as URDF, C header, Rust module, file of MuJoCo, Gazebo or Isaac Sim, or gains for ros2_control.
 
-    ``logs`` are log files along which the size of what such a file cannot say is taken.
+    ``urdf_source`` and ``mjcf_source`` are files of the same robot whose meshes, names and frames are kept. ``logs`` are
+    log files along which the size of what such a file cannot say is taken.
     """
     outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust), ("--mjcf", mjcf), ("--sdf", sdf), ("--usd", usd),
-               ("--ros2-control", ros2_control)]
+               ("--ros2-control", ros2_control), ("--urdf-source", urdf_source), ("--mjcf-source", mjcf_source)]
     with _as_file(model) as path:
         line = ["export", "-m", str(path), *_files(logs)]
         for option, output in outputs:
             line += [option, os.fspath(output)] if output is not None else []
+        line += ["--mujoco-damping"] if mujoco_damping else []
         return Result(*_command(line))
 
 

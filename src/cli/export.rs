@@ -1,9 +1,12 @@
 //! `cft-ident export`: a model for other programs, as C header, Rust module, URDF or file of a simulator.
 
 mod drives;
+mod exported;
 mod sources;
 mod tool;
 
+pub use self::exported::ExportedModel;
+use self::exported::{FormatOmission, WrittenFile};
 use self::sources::{not_of_others, source};
 mod words;
 
@@ -11,19 +14,16 @@ use cft_ident_core::explain::Explain;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-use self::words::{about_effects, beside_urdf, beyond_table, effects, never_driving};
+use self::words::{about_effects, beyond_table, effects, never_driving, not_in_here};
 use super::{
     CliError, Context, Outcome, arguments, controller, file_name, files, logs_of, paths_of,
 };
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::no_torque;
-use cft_ident_export::export::arm::{Arm, FormatSupport};
+use cft_ident_export::export::arm::{Arm, ArmSettings, BaseFrame, FormatSupport};
 use cft_ident_export::export::dissipative::below_zero;
 use cft_ident_export::export::left_out::{self, OmissionPlace};
-use cft_ident_export::export::{self, ExportError, Note, Program, urdf_source};
+use cft_ident_export::export::{self, ExportError, Note, Program, urdf, urdf_source};
 use cft_ident_files::config::{
     self, ModelFile, UrdfReplacement, replaced_in_mjcf, replaced_in_urdf,
 };
@@ -123,6 +123,10 @@ pub struct Args {
         requires = "mjcf"
     )]
     pub mjcf_source: Option<PathBuf>,
+    /// Write damping that bends with speed into the MJCF, as d0 v + d1 v |v| + d2 v^3: MuJoCo since 4.0 reads it, Pinocchio takes
+    /// it for none, and Drake refuses the file
+    #[arg(hide_short_help = true, long, requires = "mjcf")]
+    pub mujoco_damping: bool,
     /// SDF file of Gazebo to write
     #[arg(hide_short_help = true, long, value_name = "FILE.sdf", group = "into", value_parser = arguments::ends_in(["sdf"]))]
     pub sdf: Option<PathBuf>,
@@ -150,44 +154,6 @@ pub struct Args {
     /// Leave out the [[effect]] tables of the model; the files say so
     #[arg(hide_short_help = true, long)]
     pub without_effects: bool,
-}
-
-/// A model that was written for other programs.
-#[derive(Debug, Serialize, JsonSchema)]
-#[schemars(rename = "Exported")]
-pub struct ExportedModel {
-    joints: Vec<String>,
-    files: Vec<WrittenFile>,
-    /// Effects that the files do not hold.
-    left_out: Vec<String>,
-    /// What the files of simulators cannot say, file by file.
-    beyond: Vec<FormatOmission>,
-    /// Lines for a controller; null where none were asked for.
-    lines: Option<Vec<String>>,
-}
-
-/// What a format cannot say.
-#[derive(Debug, Serialize, JsonSchema)]
-#[schemars(rename = "Beyond")]
-struct FormatOmission {
-    /// The file.
-    file: String,
-    /// What it is.
-    what: String,
-    /// Joint where it is largest; null where no log determines.
-    joint: Option<String>,
-    /// Its rms over that of the joint's torque along the logs, in percent; null where no log determines.
-    percent_of_torque: Option<f64>,
-}
-
-/// A file that was written.
-#[derive(Debug, Serialize, JsonSchema)]
-#[schemars(rename = "Written")]
-struct WrittenFile {
-    /// Its name.
-    file: String,
-    /// What it is.
-    what: String,
 }
 
 fn stem(path: &Path) -> String {
@@ -330,7 +296,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         "tau = Y(q, v, a) theta + F(v) + offset, SI units and radians.".to_owned(),
     ];
     let base_lines = lines.clone();
-    let mut urdf_lines = lines.clone();
     lines.extend(about_effects(&program, &left_out));
     let never_driving = never_driving(&program);
     lines.extend(never_driving.iter().cloned());
@@ -341,6 +306,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = args.logs.iter().map(|log| escape(&log.name()));
     let logs: Vec<String> = logs.collect();
     let source = args.urdf_source.as_deref().map(source).transpose()?;
+    let settings = ArmSettings {
+        along: stretches,
+        ..ArmSettings::PLAIN
+    };
     let mut described = Vec::new();
     // every text is made before the first is written
     let mut texts: Vec<(&Path, &str, String)> = Vec::new();
@@ -350,37 +319,44 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if args.without_effects {
             kept.effects.clear();
         }
-        // of the model alone: effects are in the file beside it
-        let arm = Arm::of(&kept, &AugmentedModel::plain(model.clone()));
-        let beside = match (&arm, &source) {
-            (Ok(arm), Some(source)) => urdf_source::same_names(arm, &source.value.1),
-            _ => true,
+        let arm = ArmSettings {
+            any_bodies: source.is_none(),
+            base: match source {
+                Some(_) => BaseFrame::Silent,
+                None => BaseFrame::Turned,
+            },
+            ..settings
         };
+        let arm = Arm::of(&kept, &refined, arm).map_err(failed)?;
+        let beside =
+            (source.as_ref()).is_none_or(|source| urdf_source::same_names(&arm, &source.value.1));
         let elsewhere = match beside {
             true => OmissionPlace::Beside,
             false => OmissionPlace::Nowhere,
         };
-        if beside {
-            urdf_lines.extend(beside_urdf(&kept, &left_out));
-        }
-        if let Ok(arm) = &arm {
-            let says = export::sdf::SAYS;
-            let found = left_out::left_out(arm, &refined, says, stretches);
-            urdf_lines.extend(left_out::lines(&found, &logs, elsewhere));
-        }
+        let says = FormatSupport {
+            armature_readers: urdf::SAYS.armature_readers.filter(|_| source.is_none()),
+            ..urdf::SAYS
+        };
+        let found = left_out::left_out(&arm, &refined, says, stretches);
+        let mut urdf_lines = base_lines.clone();
+        urdf_lines.extend(not_in_here(&left_out));
+        urdf_lines.extend(left_out::lines(&found, &logs, elsewhere));
         let mut made =
-            export::urdf::urdf(&kept, model, &file_name(path), &urdf_lines).map_err(failed)?;
+            urdf::urdf(&kept, model, &arm, &file_name(path), &urdf_lines).map_err(failed)?;
         if let Some(source) = &source {
-            let arm = arm.map_err(failed)?;
             let (text, robot) = &source.value;
             let names = controller_names(&given.value.file);
             let replacement = urdf_source::replacement(&arm, robot, &source.name, &names);
             let replacement = UrdfReplacement {
-                notes: urdf_lines.clone(),
+                notes: urdf_lines,
                 ..replacement.map_err(failed)?
             };
             made.urdf = replaced_in_urdf(&source.name, text, &replacement)?;
         }
+        // what the model file beside it holds is no loss
+        let lost = found.into_iter().filter(|part| !beside || part.of_reader);
+        beyond.extend(lost.map(|part| FormatOmission::of(path, part)));
         texts.push((path, "URDF", made.urdf));
         if beside {
             texts.push((side, "model file of the URDF", made.side));
@@ -393,21 +369,28 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     }
     if !formats.is_empty() {
-        let arm = Arm::of(&given.value.file, &refined).map_err(failed)?;
         for format in &formats {
+            let of_source = args.mjcf_source.as_deref();
+            let of_source = of_source.filter(|_| args.mjcf.as_deref() == Some(format.path));
+            let base = match of_source {
+                Some(_) => BaseFrame::Kept,
+                None => BaseFrame::Turned,
+            };
+            let settings = ArmSettings {
+                base,
+                bends: args.mujoco_damping && args.mjcf.as_deref() == Some(format.path),
+                ..settings
+            };
+            let arm = Arm::of(&given.value.file, &refined, settings).map_err(failed)?;
             let says = format.says;
             let found = export::left_out::left_out(&arm, &refined, says, stretches);
             let mut head = base_lines.clone();
-            if !left_out.is_empty() {
-                let all = left_out.join(", ");
-                head.push(format!("NOT in here, though the model has it: {all}."));
-            }
+            head.extend(not_in_here(&left_out));
             head.extend(below_zero(&given.value.file, model));
             let side = export::left_out::side_file(&found, &head, &logs).map_err(failed)?;
             head.extend(left_out::lines(&found, &logs, OmissionPlace::Nowhere));
-            head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
-            let of_source = args.mjcf_source.as_deref();
-            let text = match of_source.filter(|_| args.mjcf.as_deref() == Some(format.path)) {
+            head.extend(arm.of_inertials.iter().cloned());
+            let text = match of_source {
                 None => (format.text)(&arm, &head),
                 Some(source) => {
                     let names = controller_names(&given.value.file);
@@ -418,12 +401,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             };
             texts.push((format.path, format.what, text));
             texts.push((&format.side, "what it cannot say", side));
-            beyond.extend(found.into_iter().map(|part| FormatOmission {
-                file: file_name(format.path),
-                what: part.what,
-                joint: part.joint,
-                percent_of_torque: part.percent_of_torque,
-            }));
+            let found = found.into_iter();
+            beyond.extend(found.map(|part| FormatOmission::of(format.path, part)));
         }
     }
     let note = Note {

@@ -8,6 +8,8 @@ mod blocks;
 mod drives;
 #[path = "../../crates/studies/examples/docs_tables/formulas.rs"]
 mod formulas;
+#[path = "../../crates/studies/examples/docs_tables/simulators.rs"]
+mod simulators;
 #[path = "../../crates/studies/examples/docs_tables/tables.rs"]
 mod tables;
 

@@ -2,6 +2,7 @@
 //! rustc does, the URDF as it is read back.
 
 mod urdf;
+mod world;
 
 use cft_ident::config::model_file::{LinkBody, ModelProvenance, Parameter};
 use cft_ident::config::{ModelFile, RobotFile};
@@ -377,10 +378,18 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
     ])
     .success()
     .stdout(predicates::str::contains("\"cft-ident/export/1\""));
-    for name in ["ff.h", "ff.rs", "ff.urdf", "ff.toml"] {
+    for (name, said) in [
+        ("ff.h", "Nothing of the model is left out."),
+        ("ff.rs", "Nothing of the model is left out."),
+        (
+            "ff.urdf",
+            "Not in the URDF, but in the model file beside it",
+        ),
+        ("ff.toml", "drive inertia of elbow, which Drake alone reads"),
+    ] {
         let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
         assert!(text.contains("from model.toml (SHA-256 "), "{name}");
-        assert!(text.contains("Nothing of the model is left out."), "{name}");
+        assert!(text.contains(said), "{name}");
     }
     command(&[]).code(2);
     command(&["--c", "ff.txt"]).code(2);
@@ -421,10 +430,7 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
     .success();
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(read("ripple.h").contains("Effects: ripple of elbow."));
-    assert!(
-        read("ripple.urdf")
-            .contains("Effects are in the file beside the URDF alone: ripple of elbow.")
-    );
+    assert!(read("ripple.urdf").contains("\n    ripple of elbow\n"));
     assert!(read("ripple.toml").contains("name = \"ripple\""));
     assert!(read("ripple.xml").contains("no log was given"));
     assert!(read("ripple.xml.left-out.toml").contains("what = \"ripple of elbow\""));

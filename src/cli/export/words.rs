@@ -39,9 +39,8 @@ pub(super) fn beyond_table(beyond: &[FormatOmission]) -> String {
 }
 
 pub(super) fn about_effects(program: &Program, left_out: &[String]) -> Vec<String> {
-    if !left_out.is_empty() {
-        let all = left_out.join(", ");
-        return vec![format!("NOT in here, though the model has it: {all}.")];
+    if let Some(line) = not_in_here(left_out) {
+        return vec![line];
     }
     let mut lines = vec!["Nothing of the model is left out.".to_owned()];
     let effects = &program.effects;
@@ -80,14 +79,8 @@ pub(super) fn never_driving(program: &Program) -> Vec<String> {
     words.collect()
 }
 
-pub(super) fn beside_urdf(file: &ModelFile, left_out: &[String]) -> Vec<String> {
-    let (own, all) = (effects(file), left_out.join(", "));
-    match (own.is_empty(), left_out.is_empty()) {
-        (_, false) => vec![format!("NOT in here, though the model has it: {all}.")],
-        (true, true) => vec!["Nothing of the model is left out.".to_owned()],
-        (false, true) => vec![format!(
-            "Effects are in the file beside the URDF alone: {}.",
-            own.join(", ")
-        )],
-    }
+/// That effects were asked to be left out.
+pub(super) fn not_in_here(left_out: &[String]) -> Option<String> {
+    let all = left_out.join(", ");
+    (!left_out.is_empty()).then(|| format!("NOT in here, though the model has it: {all}."))
 }

@@ -2,13 +2,16 @@
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
 
-use super::dissipative::damping_and_friction;
+use super::dissipative::{CURVES, damping_and_friction, nearest_sizes, speeds};
 use super::error::ExportError;
 use super::prepared::{Drive, PreparedModel, drive, joint_name, placed, root};
-use cft_ident_core::effect::AugmentedModel;
+use super::turned::turned_base;
 use cft_ident_core::effect::as_code::RobotProperty;
+use cft_ident_core::effect::{AugmentedModel, EffectPlace, ModelEffect};
+use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::JointKind;
-use cft_ident_core::robot::standard::{Body, STANDARD, pseudo_inertia};
+use cft_ident_core::robot::friction::sign;
+use cft_ident_core::robot::standard::{Body, COMPUTED, STANDARD};
 use cft_ident_core::robot::tree::JointCoupling;
 use cft_ident_core::robot::tree::space::{Rotation, Vector, cross, times};
 use cft_ident_files::config::ModelFile;
@@ -22,6 +25,43 @@ pub struct FormatSupport {
     pub armature: bool,
     /// Inertia and friction that two joints share.
     pub couplings: bool,
+    /// Who reads a drive's inertia, where not every reader does.
+    pub armature_readers: Option<&'static str>,
+    /// Who takes the gravity of the earth along -z for the model's, whatever the file says, as the beginning of a clause.
+    pub gravity_skipped_by: Option<&'static str>,
+}
+
+/// How a model is taken for a file.
+#[derive(Debug, Clone, Copy)]
+pub struct ArmSettings<'a> {
+    /// Motion whose speeds weigh what damping and friction cannot say of a law.
+    pub along: &'a [Stretch],
+    /// Whether bodies that cannot exist are written as they are: a model file reads them back.
+    pub any_bodies: bool,
+    pub base: BaseFrame,
+    /// Whether the file has words for damping that bends with speed.
+    pub bends: bool,
+}
+
+/// What becomes of the frame of the base.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BaseFrame {
+    /// It is turned until gravity is along -z.
+    Turned,
+    /// It stays, and the file says what gravity is.
+    Kept,
+    /// It stays, and gravity is the reader's.
+    Silent,
+}
+
+impl ArmSettings<'_> {
+    /// Of a file that the program writes by itself, without a motion.
+    pub const PLAIN: Self = ArmSettings {
+        along: &[],
+        any_bodies: false,
+        base: BaseFrame::Turned,
+        bends: false,
+    };
 }
 
 /// A model as bodies on joints.
@@ -31,12 +71,17 @@ pub struct Arm {
     pub root: String,
     /// Acceleration of free fall in its frame \[m/s^2\].
     pub gravity: Vector,
+    /// How the base stands in a world whose gravity is along -z; none where it stands upright, or where the file keeps its
+    /// frame.
+    pub turn: Option<Rotation>,
     pub links: Vec<ArmLink>,
     pub frames: Vec<FrameSection>,
     /// Gear trains that two joints turn, with inertia, damping and friction.
     pub couplings: Vec<(JointCoupling, [f64; 3])>,
+    /// Inertia of each drive \[kg or kg m^2\], below zero where a fit without constraints found it so.
+    pub drives: Vec<f64>,
     /// Where the inertials come from.
-    pub of_inertials: &'static [&'static str],
+    pub of_inertials: Vec<String>,
     /// Places in the model of the effects that are in bodies, gravity and armatures.
     pub held: Vec<usize>,
 }
@@ -80,6 +125,8 @@ pub struct OwnJoint {
     pub index: usize,
     /// \[N s/m or Nm s/rad\]
     pub damping: f64,
+    /// Damping by the speed times its size and by its cube; none but in files of MuJoCo that are to have it.
+    pub bend: [f64; 2],
     /// \[N or Nm\]
     pub friction: f64,
     /// Inertia of its drive \[kg or kg m^2\].
@@ -89,12 +136,16 @@ pub struct OwnJoint {
 
 impl Arm {
     /// The bodies and joints of a model, `refined` being what its `file` stands for. Payload, tilt and rotor
-    /// inertia go into bodies, gravity and armatures.
+    /// inertia go into bodies, gravity and armatures; a tilt only where the base may be turned.
     ///
     /// # Errors
     /// [`ExportError::NoLinks`] for robots that are no such tree; [`ExportError::Impossible`] for a link that
-    /// no body can be.
-    pub fn of(file: &ModelFile, refined: &AugmentedModel) -> Result<Self, ExportError> {
+    /// no body can be; [`ExportError::NoMass`].
+    pub fn of(
+        file: &ModelFile,
+        refined: &AugmentedModel,
+        settings: ArmSettings,
+    ) -> Result<Self, ExportError> {
         let prepared = PreparedModel::of(file, &refined.model)?;
         let (file, robot) = (&prepared.file, &prepared.model.robot);
         let links = robot.tree().links();
@@ -103,65 +154,54 @@ impl Arm {
         drives.resize(robot.joints(), 0.0);
         let (mut gravity, mut held) = (robot.tree().gravity(), Vec::new());
         for (i, effect) in refined.effects.iter().enumerate() {
-            if let Some(property) = effect.property() {
+            let property = effect.property();
+            let stays = |property: &RobotProperty| {
+                settings.base == BaseFrame::Silent && matches!(property, RobotProperty::Gravity(_))
+            };
+            if settings.bends && bent(effect, None).is_some() {
+                held.push(i);
+            }
+            if let Some(property) = property.filter(|property| !stays(property)) {
                 fold(property, &mut bodies, &mut drives, &mut gravity);
                 held.push(i);
             }
         }
         let couplings = robot.transmission().couplings().iter().copied();
         let couplings = couplings.zip(robot.coupling_parameters(&prepared.model.theta));
-        let mut out = Vec::new();
+        let mut of_inertials: Vec<String> = prepared
+            .of_inertials
+            .iter()
+            .map(|x| (*x).to_owned())
+            .collect();
+        let (mut out, mut points) = (Vec::new(), Vec::new());
         for (i, link) in links.iter().enumerate() {
             let body: [f64; STANDARD] = std::array::from_fn(|k| bodies[i * STANDARD + k]);
-            let least = SymmetricEigen::new(pseudo_inertia(&body)).eigenvalues.min();
-            if least.is_nan() || least < 0.0 || body[9] <= 0.0 {
-                return Err(ExportError::Impossible {
-                    link: link.name.clone(),
-                    eigenvalue: least,
-                });
+            let body = body_of(
+                &link.name,
+                &body,
+                settings.any_bodies,
+                file.links.is_empty(),
+            )?;
+            if body.is_point() {
+                points.push(link.name.as_str());
             }
-            let moved = drive(robot, link)?;
-            let name = joint_name(robot, link, &moved);
-            let (rotation, origin) = placed(link, &moved);
-            let joint = match moved {
-                Drive::Joint(j) => {
-                    let law = &prepared.model.friction[j];
-                    let [damping, friction] = damping_and_friction(law).map(|x| x.max(0.0));
-                    ArmJoint::Own(Box::new(OwnJoint {
-                        limits: file.robot.limits.get(&name).cloned().unwrap_or_default(),
-                        index: j,
-                        damping,
-                        friction,
-                        armature: drives[j].max(0.0),
-                        name,
-                    }))
-                }
-                Drive::Mimic(of, factor, offset) => ArmJoint::Mimic {
-                    name,
-                    of,
-                    factor,
-                    offset,
-                },
-                Drive::Rest(_) => ArmJoint::Fixed,
-            };
-            out.push(ArmLink {
-                name: link.name.clone(),
-                parent: link.parent,
-                rotation,
-                origin,
-                axis: link.axis,
-                kind: link.kind,
-                joint,
-                body: Body::of(&body),
-            });
+            out.push(prepared.link(i, body, &drives, refined, settings)?);
+        }
+        if !points.is_empty() {
+            of_inertials.push(format!(
+                "No extent by this model, so that they have the least moments that all readers take: {}.",
+                points.join(", ")
+            ));
         }
         Ok(Self {
             root: root(robot, file),
+            turn: turned_base(&gravity).filter(|_| settings.base == BaseFrame::Turned),
             gravity,
             links: out,
             frames: file.robot.robot.frame.clone(),
             couplings: couplings.collect(),
-            of_inertials: prepared.of_inertials,
+            drives,
+            of_inertials,
             held,
         })
     }
@@ -192,6 +232,133 @@ impl Arm {
         }
         own.iter().flatten().all(|x| *x >= 0.0).then_some(own)
     }
+}
+
+impl PreparedModel {
+    /// Link `i` with its body, on its joint.
+    fn link(
+        &self,
+        i: usize,
+        body: Body,
+        drives: &[f64],
+        refined: &AugmentedModel,
+        settings: ArmSettings,
+    ) -> Result<ArmLink, ExportError> {
+        let robot = &self.model.robot;
+        let link = &robot.tree().links()[i];
+        let moved = drive(robot, link)?;
+        let name = joint_name(robot, link, &moved);
+        let (rotation, origin) = placed(link, &moved);
+        let joint = match moved {
+            Drive::Joint(j) => {
+                let [damping, friction, bend @ ..] = self.friction(j, refined, settings);
+                let limits = self.file.robot.limits.get(&name);
+                ArmJoint::Own(Box::new(OwnJoint {
+                    limits: limits.cloned().unwrap_or_default(),
+                    index: j,
+                    damping,
+                    friction,
+                    bend,
+                    armature: drives[j].max(0.0),
+                    name,
+                }))
+            }
+            Drive::Mimic(of, factor, offset) => ArmJoint::Mimic {
+                name,
+                of,
+                factor,
+                offset,
+            },
+            Drive::Rest(_) => ArmJoint::Fixed,
+        };
+        Ok(ArmLink {
+            name: link.name.clone(),
+            parent: link.parent,
+            rotation,
+            origin,
+            axis: link.axis,
+            kind: link.kind,
+            joint,
+            body,
+        })
+    }
+}
+
+impl PreparedModel {
+    /// Sizes of the [`CURVES`] of joint `j`, none below zero.
+    fn friction(&self, j: usize, refined: &AugmentedModel, settings: ArmSettings) -> [f64; 4] {
+        let law = &self.model.friction[j];
+        let bent: Vec<[f64; 2]> = match settings.bends {
+            true => refined
+                .effects
+                .iter()
+                .filter_map(|effect| bent(effect, Some(j)))
+                .collect(),
+            false => Vec::new(),
+        };
+        let [damping, friction] = damping_and_friction(law).map(|x| x.max(0.0));
+        let said = [damping, friction, 0.0, 0.0];
+        if law.parameters() <= 2 && bent.is_empty() {
+            return said;
+        }
+        let seen = self.file.held_out.get(j).map(|held| held.speed_seen);
+        let whole = |v: f64| {
+            let bent = bent
+                .iter()
+                .map(|[size, power]| size * sign(v) * v.abs().powf(*power));
+            law.torque(v) + bent.sum::<f64>()
+        };
+        let curves = if settings.bends {
+            &CURVES[..]
+        } else {
+            &CURVES[..2]
+        };
+        let sizes = nearest_sizes(whole, curves, &speeds(j, settings.along, seen));
+        sizes.map_or(said, |sizes| {
+            std::array::from_fn(|k| sizes.get(k).copied().unwrap_or(0.0))
+        })
+    }
+}
+
+/// Size and power of an effect that is friction which bends with speed, of joint `j` where one is named.
+pub(super) fn bent(effect: &ModelEffect, j: Option<usize>) -> Option<[f64; 2]> {
+    let EffectPlace::Joint(at) = effect.place else {
+        return None;
+    };
+    let is = effect.name() == "nonlinear-viscous" && j.is_none_or(|j| j == at);
+    is.then(|| [effect.linear[0], effect.shape[0]])
+}
+
+/// The body of a link of these standard parameters, as readers take it.
+fn body_of(
+    link: &str,
+    standard: &[f64; STANDARD],
+    any: bool,
+    unconstrained: bool,
+) -> Result<Body, ExportError> {
+    let body = Body::of(standard);
+    let physical = body.physical(COMPUTED);
+    let (mass, moment) = (standard[9], &standard[6..9]);
+    let size = moment.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // a centre of gravity a kilometre away would cost the digits of the inertia
+    if any && size > 1e3 * mass.abs() {
+        let link = link.to_owned();
+        return Err(ExportError::NoMass {
+            link,
+            mass,
+            moment: size,
+        });
+    }
+    let written = any.then_some(body);
+    physical.or(written).ok_or_else(|| ExportError::Impossible {
+        link: link.to_owned(),
+        remedy: match unconstrained {
+            true => "identify with `lsq` without --unconstrained, whose links can exist",
+            false => {
+                "its parameters are not those of its [[link]] tables: fit again, or export with --c or --rust"
+            }
+        },
+    })
 }
 
 /// Takes an effect into bodies, drives or gravity, where it is one of these.

@@ -3,12 +3,14 @@
 //! A coefficient of a fitted law may be negative where its terms together take power over the speeds of
 //! the logs; damping below zero alone drives a simulated joint away, and formats do not allow it.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::error::ExportError;
 use cft_ident_core::effect::as_code::EffectsCode;
 use cft_ident_core::effect::{AugmentedModel, EffectScene, StretchTorques};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
-use cft_ident_core::robot::friction::ViscousCoulomb;
+use cft_ident_core::robot::friction::{ViscousCoulomb, sign};
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_files::config::ModelFile;
 
@@ -19,6 +21,56 @@ pub(super) fn damping_and_friction(law: &JointFriction) -> [f64; 2] {
         JointFriction::ViscousCoulomb(law) => [law.viscous, law.coulomb],
         JointFriction::DoubleTanh(law) => [law.viscous, law.coulomb_1 + law.coulomb_2],
     }
+}
+
+/// The curves of the speed that files of links have words for: viscous and Coulomb friction, and of MuJoCo alone damping by the
+/// speed times its size and by its cube.
+pub(super) const CURVES: [fn(f64) -> f64; 4] = [|v| v, sign, |v| v * v.abs(), |v| v * v * v];
+
+/// Speeds of joint `j` along a motion; evenly up to that which its fit has `seen` where there is no motion.
+pub(super) fn speeds(j: usize, along: &[Stretch], seen: Option<f64>) -> Vec<f64> {
+    let speeds = along.iter().flat_map(|s| s.v[j].iter().copied());
+    let speeds: Vec<f64> = speeds.collect();
+    match seen.filter(|top| speeds.is_empty() && top.is_finite()) {
+        Some(top) => (1..=STEPS)
+            .map(|k| top * f64::from(k) / f64::from(STEPS))
+            .collect(),
+        None => speeds,
+    }
+}
+
+/// Speeds at which a law is looked at where no motion says which.
+const STEPS: u32 = 100;
+
+/// Sizes of `curves`, none below zero, whose sum is nearest to a friction over these speeds; none where they do not tell.
+pub(super) fn nearest_sizes(
+    friction: impl Fn(f64) -> f64,
+    curves: &[fn(f64) -> f64],
+    speeds: &[f64],
+) -> Option<Vec<f64>> {
+    let n = curves.len();
+    let (mut square, mut with) = (DMatrix::zeros(n, n), DVector::zeros(n));
+    for v in speeds {
+        let row = DVector::from_iterator(n, curves.iter().map(|curve| curve(*v)));
+        square += &row * row.transpose();
+        with += row * friction(*v);
+    }
+    // of few curves each subset is tried: the best of those whose sizes are not below zero is the nearest
+    let subsets = (1..1_usize << n).map(|bits| (0..n).filter(|k| bits >> k & 1 == 1).collect());
+    let solved = subsets.filter_map(|some: Vec<usize>| {
+        let part = square.select_rows(&some).select_columns(&some);
+        let right = with.select_rows(&some);
+        let sizes = part.cholesky()?.solve(&right);
+        let explained = sizes.dot(&right);
+        let mut all = vec![0.0; n];
+        some.iter()
+            .zip(&sizes)
+            .for_each(|(k, size)| all[*k] = *size);
+        let allowed = sizes.iter().all(|size| *size >= 0.0 && size.is_finite());
+        allowed.then_some((explained, all))
+    });
+    let best = solved.max_by(|(a, _), (b, _)| a.total_cmp(b));
+    best.map(|(_, sizes)| sizes)
 }
 
 /// Speeds at which friction is looked at: so many in each decade of these \[m/s or rad/s\].
@@ -149,4 +201,28 @@ pub fn below_zero(file: &ModelFile, model: &Model) -> Vec<String> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_the_nearest_of_those_that_are_not_below_zero() {
+        let speeds: Vec<f64> = (-50..=50).map(|k| 0.04 * f64::from(k)).collect();
+        let law = |v: f64| 0.7 * v + 2.0 * sign(v) + 0.3 * v * v * v;
+        let all = nearest_sizes(law, &CURVES, &speeds).unwrap();
+        for (size, wanted) in all.iter().zip([0.7, 2.0, 0.0, 0.3]) {
+            assert!((size - wanted).abs() < 1e-9, "{all:?}");
+        }
+        // a fall with speed is none, and its level the mean
+        let falling = nearest_sizes(|v| sign(v) * (2.0 - 0.3 * v.abs()), &CURVES[..2], &speeds);
+        let falling = falling.unwrap();
+        assert_eq!(falling[0], 0.0);
+        assert!(
+            (falling[1] - (2.0 - 0.3 * 1.02)).abs() < 1e-9,
+            "{falling:?}"
+        );
+        assert_eq!(nearest_sizes(law, &CURVES, &[]), None);
+    }
 }

@@ -34,10 +34,10 @@ pub enum ExportError {
     NoInertia { joint: String, inertia: f64 },
     /// A link that no body can be, which simulators refuse or integrate into nonsense.
     #[explain(
-        "link `{link}` can be no body: its pseudo-inertia has the eigenvalue {eigenvalue:.3e}",
-        "identify with `lsq` without --unconstrained, whose links can exist"
+        "link `{link}` can be no body: its mass is not above 0, or a principal moment is below 0 or above the sum of the others",
+        remedy
     )]
-    Impossible { link: String, eigenvalue: f64 },
+    Impossible { link: String, remedy: &'static str },
     /// The user's URDF is of another robot, or its frames are others.
     #[explain("{file}: {problem}", remedy)]
     OtherUrdf {

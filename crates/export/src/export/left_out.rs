@@ -2,14 +2,17 @@
 
 use serde::Serialize;
 
-use super::arm::{Arm, FormatSupport};
-use super::dissipative::{damping_and_friction, scene};
+use super::arm::{Arm, FormatSupport, bent};
+use super::dissipative::{CURVES, damping_and_friction, scene};
 use super::error::ExportError;
 use super::prepared::hashed;
 use cft_ident_core::effect::{AugmentedModel, shifted};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
+use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::friction::sign;
+use cft_ident_core::robot::tree::Tree;
+use cft_ident_core::robot::tree::space::Vector;
 
 /// A part of the model's torque that a file does not hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,11 +25,15 @@ pub struct LeftOut {
     /// Its rms over that of the joint's torque, in percent; absent where no log determines.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub percent_of_torque: Option<f64>,
+    /// Whether it is a matter of the reader's, which no model file beside a URDF mends.
+    #[serde(skip)]
+    pub of_reader: bool,
 }
 
 /// A part of the model that a file cannot say, with the torque that it is worth.
 struct OmittedPart<'a> {
     what: String,
+    of_reader: bool,
     torque: Box<Torque<'a>>,
 }
 
@@ -66,6 +73,7 @@ pub fn left_out(
             joint: worst.map(|j| names[j].clone()),
             // more digits than anybody can use would differ from machine to machine
             percent_of_torque: worst.map(|j| (1e4 * share(j)).round() / 1e4),
+            of_reader: part.of_reader,
         }
     });
     shown.collect()
@@ -84,6 +92,7 @@ fn parts<'a>(
     let mut of_joint = |what: String, j: usize, f: Box<dyn Fn(f64, f64) -> f64 + 'a>| {
         out.push(OmittedPart {
             what,
+            of_reader: false,
             torque: Box::new(move |s, _| {
                 let mut all = vec![vec![0.0; s.len()]; n];
                 let state = s.v[j].iter().zip(&s.a[j]);
@@ -100,27 +109,54 @@ fn parts<'a>(
         }
         if joint.armature != 0.0 && !says.armature {
             let armature = joint.armature;
+            let but = says.armature_readers.map_or(String::new(), |readers| {
+                format!(", which {readers} alone reads")
+            });
             of_joint(
-                format!("drive inertia of {name}"),
+                format!("drive inertia of {name}{but}"),
                 j,
                 Box::new(move |_, a| armature * a),
             );
         }
         let law = model.friction[j];
-        let (damping, friction) = (joint.damping, joint.friction);
-        if damping_and_friction(&law) != [damping, friction] || law.parameters() > 2 {
+        let [bend, cube] = joint.bend;
+        let sizes = [joint.damping, joint.friction, bend, cube];
+        let held = refined.effects.iter().enumerate();
+        let held = held.filter(|(i, _)| arm.held.contains(i));
+        let bent: Vec<[f64; 2]> = held
+            .filter_map(|(_, effect)| bent(effect, Some(j)))
+            .collect();
+        let differs = damping_and_friction(&law) != [sizes[0], sizes[1]];
+        if differs || law.parameters() > 2 || !bent.is_empty() {
             of_joint(
                 format!("the friction law of {name} beside damping and friction"),
                 j,
-                Box::new(move |v, _| law.torque(v) - damping * v - friction * sign(v)),
+                Box::new(move |v, _| {
+                    let bent = bent
+                        .iter()
+                        .map(|[size, power]| size * sign(v) * v.abs().powf(*power));
+                    let said = CURVES
+                        .iter()
+                        .zip(sizes)
+                        .map(|(curve, size)| size * curve(v));
+                    law.torque(v) + bent.sum::<f64>() - said.sum::<f64>()
+                }),
             );
         }
+    }
+    if let Some((what, off)) = arm.gravity_said(says) {
+        out.push(OmittedPart {
+            what,
+            of_reader: true,
+            torque: Box::new(move |s, _| arm.held_in(&model.robot, off, s)),
+        });
     }
     if !(says.couplings && arm.trains().is_some()) {
         for (c, [inertia, viscous, coulomb]) in &arm.couplings {
             let (m, o, r) = (c.motor, c.other, c.ratio);
             out.push(OmittedPart {
                 what: format!("gear train of {} that {} turns too", names[m], names[o]),
+                of_reader: false,
                 torque: Box::new(move |s, _| {
                     let mut all = vec![vec![0.0; s.len()]; n];
                     let turning = |k: usize| coulomb * sign(s.v[m][k] + r * s.v[o][k]);
@@ -140,6 +176,7 @@ fn parts<'a>(
         let late = (0..n).any(|j| effect.shift(j) != 0.0);
         out.push(OmittedPart {
             what: effect.title(&model.robot),
+            of_reader: false,
             torque: Box::new(move |s, hat| {
                 if late {
                     let each = hat.iter().enumerate().map(|(j, hat)| {
@@ -160,6 +197,29 @@ fn parts<'a>(
         });
     }
     out
+}
+
+impl Arm {
+    /// Torques that hold the arm along a stretch in a gravity of its own \[m/s^2\].
+    fn held_in(&self, robot: &Robot, gravity: Vector, s: &Stretch) -> Vec<Vec<f64>> {
+        let (n, links) = (robot.joints(), robot.tree().links().to_vec());
+        let mut all = vec![vec![0.0; s.len()]; n];
+        let Ok(tree) = Tree::new(links, n, gravity) else {
+            return all;
+        };
+        let robot = Robot::of_tree(tree, robot.joint_names().to_vec(), false, Vec::new());
+        let standard = self.links.iter().flat_map(|link| link.body.standard());
+        let theta = robot.base_of(&standard.collect::<Vec<f64>>());
+        let (rest, mut tau) = (vec![0.0; n], vec![0.0; n]);
+        for k in 0..s.len() {
+            let q: Vec<f64> = s.q.iter().map(|q| q[k]).collect();
+            robot.torque(&theta, &q, &rest, &rest, &mut tau);
+            for (all, tau) in all.iter_mut().zip(&tau) {
+                all[k] = *tau;
+            }
+        }
+        all
+    }
 }
 
 /// Where what a file cannot say is.

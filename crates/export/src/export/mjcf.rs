@@ -15,6 +15,8 @@ use cft_ident_files::config::MjcfJoint;
 pub const SAYS: FormatSupport = FormatSupport {
     armature: true,
     couplings: true,
+    armature_readers: None,
+    gravity_skipped_by: Some("Pinocchio and newton take"),
 };
 
 /// The text of a model; `notes` stand at its head.
@@ -22,13 +24,31 @@ pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
     let mut out = format!("<!--\n{}", in_comment(notes));
     let _ = write!(
         out,
-        "-->\n<mujoco model=\"identified\">\n  <compiler angle=\"radian\" autolimits=\"true\" \
-         inertiafromgeom=\"false\"/>\n  <option gravity=\"{}\"/>\n  <worldbody>\n    <body name=\"{}\">\n",
-        words(&arm.gravity),
+        "-->\n<mujoco model=\"identified\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  \
+         <option gravity=\"{}\"/>\n  <worldbody>\n    <body name=\"{}\">\n",
+        words(&arm.world_gravity()),
         quoted(&arm.root)
     );
     let own = arm.trains();
-    bodies(&mut out, arm, None, 3, own.as_deref());
+    // Pinocchio skips the pose of a body that is fixed to the world
+    if let Some(turn) = &arm.turn {
+        let _ = writeln!(
+            out,
+            "      <body name=\"{}_turned\" quat=\"{}\">",
+            quoted(&arm.root),
+            words(&quaternion(turn))
+        );
+    }
+    bodies(
+        &mut out,
+        arm,
+        None,
+        3 + usize::from(arm.turn.is_some()),
+        own.as_deref(),
+    );
+    if arm.turn.is_some() {
+        out.push_str("      </body>\n");
+    }
     out.push_str("    </body>\n  </worldbody>\n");
     if let (Some(_), false) = (&own, arm.couplings.is_empty()) {
         tendons(&mut out, arm);
@@ -135,12 +155,16 @@ fn joint(out: &mut String, link: &ArmLink, pad: &str, own: Option<&[[f64; 2]]>) 
         ArmJoint::Own(joint) => {
             let whole = [joint.armature, joint.damping];
             let [armature, damping] = own.map_or(whole, |own| own[joint.index]);
+            let bend = match joint.bend {
+                [0.0, 0.0] => String::new(),
+                bend => format!(" {}", words(&bend)),
+            };
             let range = joint.limits.position;
             let range = range.map_or(String::new(), |ends| format!(" range=\"{}\"", words(&ends)));
             let _ = writeln!(
                 out,
                 "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{axis}\" armature=\"{armature:?}\" \
-                 damping=\"{damping:?}\" frictionloss=\"{:?}\"{range}/>",
+                 damping=\"{damping:?}{bend}\" frictionloss=\"{:?}\"{range}/>",
                 quoted(&joint.name),
                 joint.friction
             );

@@ -13,6 +13,7 @@
 //! | [`dissipative`] | friction and drive inertias below zero |
 //! | `single` | a single joint as a chain of one link |
 //! | `prepared` | a model as links with inertials |
+//! | `turned` | a base turned so that gravity is along -z |
 //! | [`arm`] | the same as simulators take it: armature, damping, friction |
 //! | [`left_out`] | what a format cannot say, and how much of the torque that is |
 //! | [`mjcf`] [`sdf`] [`usd`] | MuJoCo, Gazebo, Isaac Sim |
@@ -38,6 +39,7 @@ pub mod ros2_control;
 pub mod sdf;
 mod single;
 mod standard;
+mod turned;
 pub mod urdf;
 pub mod urdf_source;
 pub mod usd;

@@ -2,15 +2,17 @@
 
 use std::fmt::Write;
 
-use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport};
+use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, OwnJoint};
 use super::prepared::{MOMENTS, in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::roll_pitch_yaw;
 
-/// What SDF can say: a drive's inertia has no element, and joints share nothing.
+/// What SDF can say: a drive's inertia has no element but one of Drake's own, and joints share nothing.
 pub const SAYS: FormatSupport = FormatSupport {
     armature: false,
     couplings: false,
+    armature_readers: Some("Drake"),
+    gravity_skipped_by: Some("Drake takes"),
 };
 
 /// Largest number that stands for none.
@@ -22,11 +24,12 @@ pub fn sdf(arm: &Arm, notes: &[String]) -> String {
     let root = quoted(&arm.root);
     let _ = write!(
         out,
-        "-->\n<sdf version=\"1.9\">\n  <world name=\"identified\">\n    <gravity>{}</gravity>\n    \
-         <model name=\"identified\">\n      <link name=\"{root}\"/>\n      \
-         <joint name=\"{root}_to_world\" type=\"fixed\">\n        <parent>world</parent>\n        \
+        "-->\n<sdf version=\"1.9\" xmlns:drake=\"drake.mit.edu\">\n  <world name=\"identified\">\n    \
+         <gravity>{}</gravity>\n    <model name=\"identified\">\n      <link name=\"{root}\">\n        \
+         <pose>0 0 0 {}</pose>\n      </link>\n      <joint name=\"{root}_to_world\" type=\"fixed\">\n        <parent>world</parent>\n        \
          <child>{root}</child>\n      </joint>\n",
-        words(&arm.gravity)
+        words(&arm.world_gravity()),
+        words(&roll_pitch_yaw(&arm.standing()))
     );
     for link in &arm.links {
         let parent = link
@@ -65,7 +68,7 @@ pub fn sdf(arm: &Arm, notes: &[String]) -> String {
 
 fn joint(out: &mut String, link: &ArmLink, parent: &str) {
     let child = quoted(&link.name);
-    let (name, limits, loss, mimic) = match &link.joint {
+    let (name, limits, loss, more, mimic) = match &link.joint {
         ArmJoint::Fixed => {
             let _ = write!(
                 out,
@@ -78,6 +81,7 @@ fn joint(out: &mut String, link: &ArmLink, parent: &str) {
             quoted(&joint.name),
             joint.limits.clone(),
             [joint.damping, joint.friction],
+            rotor(joint),
             String::new(),
         ),
         ArmJoint::Mimic {
@@ -89,6 +93,7 @@ fn joint(out: &mut String, link: &ArmLink, parent: &str) {
             quoted(name),
             Default::default(),
             [0.0; 2],
+            String::new(),
             format!(
                 "          <mimic joint=\"{}\"><multiplier>{factor:?}</multiplier><offset>{offset:?}</offset>\
                  <reference>0</reference></mimic>\n",
@@ -110,11 +115,23 @@ fn joint(out: &mut String, link: &ArmLink, parent: &str) {
         "      <joint name=\"{name}\" type=\"{kind}\">\n        <parent>{parent}</parent>\n        \
          <child>{child}</child>\n        <axis>\n          <xyz>{}</xyz>\n          \
          <limit><lower>{low}</lower><upper>{high}</upper><effort>{}</effort><velocity>{}</velocity></limit>\n          \
-         <dynamics><damping>{:?}</damping><friction>{:?}</friction></dynamics>\n{mimic}        </axis>\n      </joint>\n",
+         <dynamics><damping>{:?}</damping><friction>{:?}</friction></dynamics>\n{mimic}        </axis>\n{more}      </joint>\n",
         words(&link.axis),
         shown(limits.torque),
         shown(limits.speed),
         loss[0],
         loss[1]
     );
+}
+
+/// The inertia of a drive, for Drake.
+fn rotor(joint: &OwnJoint) -> String {
+    match joint.armature > 0.0 {
+        true => format!(
+            "        <drake:rotor_inertia>{:?}</drake:rotor_inertia>\n        \
+             <drake:gear_ratio>1</drake:gear_ratio>\n",
+            joint.armature
+        ),
+        false => String::new(),
+    }
 }

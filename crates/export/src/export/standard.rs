@@ -86,9 +86,12 @@ pub fn nearest(
         }
     }
     let moved = (&x - &prior).amax() / prior.amax().max(f64::MIN_POSITIVE);
+    let is_prior = moved < ROUNDING;
+    // rounding of a heavy link is much to a light one
+    let values = if is_prior { prior } else { x };
     StandardParameters {
-        values: x.iter().copied().collect(),
+        values: values.iter().copied().collect(),
         identifiability,
-        is_prior: moved < ROUNDING,
+        is_prior,
     }
 }

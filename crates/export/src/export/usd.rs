@@ -1,5 +1,5 @@
-//! OpenUSD as text, with the physics schemas that Isaac Sim reads: rigid bodies with mass properties, joints
-//! with armature, friction and damping of PhysX. Numbers of bodies are of single precision there.
+//! OpenUSD as text, with the physics schemas that Isaac Sim and newton read: rigid bodies with mass properties, joints
+//! with armature, friction and damping of PhysX and of newton. Numbers of bodies are of single precision there.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -9,10 +9,12 @@ use super::prepared::hashed;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::{Rotation, UNTURNED, Vector, add, product, turn};
 
-/// What USD can say with the schemas of PhysX.
+/// What USD can say with the schemas of PhysX and newton.
 pub const SAYS: FormatSupport = FormatSupport {
     armature: true,
     couplings: false,
+    armature_readers: None,
+    gravity_skipped_by: None,
 };
 
 /// Names of prims: letters, digits and underscores, each once.
@@ -41,7 +43,7 @@ fn tuple(values: &[f64]) -> String {
 /// The text of a stage; `notes` stand at its head.
 pub fn usd(arm: &Arm, notes: &[String]) -> String {
     let mut out = String::from("#usda 1.0\n");
-    let [x, y, z] = arm.gravity;
+    let [x, y, z] = arm.world_gravity();
     let size = (x * x + y * y + z * z).sqrt();
     let down = match size > 0.0 {
         true => [x / size, y / size, z / size],
@@ -51,6 +53,7 @@ pub fn usd(arm: &Arm, notes: &[String]) -> String {
         "(\n    defaultPrim = \"identified\"\n    metersPerUnit = 1\n    kilogramsPerUnit = 1\n    upAxis = \"Z\"\n)\n\n",
     );
     out += &hashed(notes);
+    let standing = arm.standing();
     let mut prims = PrimNames(BTreeSet::new());
     let scene = prims.name("scene");
     let root = prims.name(&arm.root);
@@ -66,16 +69,21 @@ pub fn usd(arm: &Arm, notes: &[String]) -> String {
         "\ndef Xform \"identified\" (\n    prepend apiSchemas = [\"PhysicsArticulationRootAPI\"]\n)\n{{\n    \
          def PhysicsScene \"{scene}\"\n    {{\n        vector3f physics:gravityDirection = {}\n        \
          float physics:gravityMagnitude = {size:?}\n    }}\n\n    def Xform \"{root}\" (\n        \
-         prepend apiSchemas = [\"PhysicsRigidBodyAPI\"]\n    )\n    {{\n    }}\n\n    \
-         def PhysicsFixedJoint \"{}\"\n    {{\n        rel physics:body1 = </identified/{root}>\n    }}\n",
+         prepend apiSchemas = [\"PhysicsRigidBodyAPI\"]\n    )\n    {{\n        quatd xformOp:orient = {stands}\n        \
+         uniform token[] xformOpOrder = [\"xformOp:orient\"]\n    }}\n\n    def PhysicsFixedJoint \"{}\"\n    {{\n        \
+         rel physics:body1 = </identified/{root}>\n        quatf physics:localRot0 = {stands}\n    }}\n",
         tuple(&down),
         prims.name("root_joint"),
+        stands = tuple(&quaternion(&standing)),
     );
     let mut poses: Vec<(Rotation, Vector)> = Vec::new();
     for (i, link) in arm.links.iter().enumerate() {
         let (rotation, origin) = match link.parent.and_then(|parent| poses.get(parent)) {
             Some((r, o)) => (product(r, &link.rotation), add(o, &turn(r, &link.origin))),
-            None => (link.rotation, link.origin),
+            None => (
+                product(&standing, &link.rotation),
+                turn(&standing, &link.origin),
+            ),
         };
         body(&mut out, link, &bodies[i], &rotation, &origin);
         poses.push((rotation, origin));
@@ -131,7 +139,8 @@ fn joint(
     let mut lines = String::new();
     match &link.joint {
         ArmJoint::Own(joint) => {
-            schemas = format!("\"PhysxJointAxisAPI:{axis_name}\", \"PhysxJointAPI\"");
+            schemas =
+                format!("\"PhysxJointAxisAPI:{axis_name}\", \"PhysxJointAPI\", \"NewtonJointAPI\"");
             own(&mut lines, joint, axis_name, per);
         }
         ArmJoint::Mimic {
@@ -192,7 +201,8 @@ fn own(lines: &mut String, joint: &OwnJoint, axis: &str, per: f64) {
         "        float physxJoint:armature = {0:?}\n        float physxJointAxis:{axis}:armature = {0:?}\n        \
          float physxJointAxis:{axis}:staticFrictionEffort = {1:?}\n        \
          float physxJointAxis:{axis}:dynamicFrictionEffort = {1:?}\n        \
-         float physxJointAxis:{axis}:viscousFrictionCoefficient = {2:?}\n",
+         float physxJointAxis:{axis}:viscousFrictionCoefficient = {2:?}\n        \
+         float newton:armature = {0:?}\n        float newton:friction = {1:?}\n        float newton:damping = {2:?}\n",
         joint.armature,
         joint.friction,
         joint.damping * per

@@ -9,6 +9,7 @@ mod blocks;
 mod drives;
 mod figures;
 mod formulas;
+mod simulators;
 mod tables;
 
 use std::path::Path;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{arms, drives, formulas};
+use super::{arms, drives, formulas, simulators};
 use cft_ident::number::{percent, significant, value_and_std};
 use cft_ident::report::usual::{ErrorScope, PUBLISHED, PublishedError, TorqueMeasurement};
 use serde_json::Value;
@@ -28,52 +28,17 @@ pub fn render(words: &[&str]) -> Rendered {
         ["drive-parameters", names @ ..] => drives::parameters(names),
         ["drive-errors", names @ ..] => drives::errors(names),
         ["usual"] => Ok(usual()),
-        ["left-out", result] => Ok(left_out(&json(result)?)),
-        ["replay", result] => Ok(replay(&json(result)?)),
+        ["left-out", result] => Ok(simulators::left_out(&json(result)?)),
+        ["replay", result] => Ok(simulators::replay(&json(result)?)),
+        ["readers", result] => Ok(simulators::readers(&json(result)?)),
+        ["probes", result] => Ok(simulators::probes(&json(result)?)),
+        ["same-robot", results @ ..] => simulators::same_robot(results),
         ["text", name] => {
             let text = read(&format!("{name}.txt"))?;
             Ok(format!("```text\n{}\n```\n", text.trim_end()))
         }
         _ => Err(format!("`{}` is no known kind of table", words.join(" "))),
     }
-}
-
-/// What a file of a simulator cannot say.
-fn left_out(result: &Value) -> String {
-    let each = rows(&result["left_out"]).iter().map(|part| {
-        let percent = significant(number(&part["percent_of_torque"]), 3);
-        vec![text(&part["what"]).to_owned(), format!("{percent} %")]
-    });
-    table(
-        &["<not in the file", "of the torque"],
-        &each.collect::<Vec<_>>(),
-    )
-}
-
-/// Errors of windows that were replayed in a simulator.
-fn replay(result: &Value) -> String {
-    let degrees = |value: &Value| format!("{}°", significant(number(value), 3));
-    let each = rows(&result["errors"]).iter().map(|line| {
-        vec![
-            text(&line["machine"]).to_owned(),
-            text(&line["joint"]).to_owned(),
-            format!("{} s", number(&line["seconds"])),
-            number(&line["windows"]).to_string(),
-            degrees(&line["before_deg"]),
-            degrees(&line["after_deg"]),
-            degrees(&line["after_offsets_deg"]),
-        ]
-    });
-    let columns = [
-        "<machine",
-        "<joint",
-        "window",
-        "windows",
-        "before",
-        "after",
-        "after, offsets taken off",
-    ];
-    table(&columns, &each.collect::<Vec<_>>())
 }
 
 fn read(name: &str) -> Result<String, String> {

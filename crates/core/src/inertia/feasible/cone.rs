@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, DVectorView, Matrix4};
 
-use crate::robot::standard::{STANDARD, pseudo_inertia, standard_of};
+use crate::robot::standard::{Body, STANDARD, WRITTEN, pseudo_inertia, standard_of};
 
 /// Part of the way to the border that a step may go.
 const INSIDE: f64 = 0.9;
@@ -176,10 +176,10 @@ impl ConePrior {
     }
 }
 
-/// The pseudo-inertia of a body, where it is one that can exist.
-pub(super) fn prior_of(standard: &[f64; STANDARD]) -> Option<Matrix4<f64>> {
-    let j = pseudo_inertia(standard);
-    j.cholesky().map(|_| j)
+/// The pseudo-inertia of a body as a robot file writes it, where it is one that can exist and has an extent.
+pub(super) fn prior_of(body: &Body) -> Option<Matrix4<f64>> {
+    let body = body.physical(WRITTEN).filter(|body| !body.is_point())?;
+    Some(pseudo_inertia(&body.standard()))
 }
 
 #[cfg(test)]
@@ -189,7 +189,7 @@ mod tests {
     fn cone() -> ConePrior {
         let prior = [0.05, 0.001, -0.002, 0.06, 0.003, 0.04, 0.1, -0.05, 0.2, 2.0];
         ConePrior {
-            links: vec![prior_of(&prior).unwrap()],
+            links: vec![prior_of(&Body::of(&prior)).unwrap()],
             numbers: vec![0.3],
         }
     }
@@ -233,6 +233,7 @@ mod tests {
         let part = at.longest(&step);
         assert!((part - 0.18).abs() < 1e-9, "{part}");
         assert!(at.after(&step, part).is_some() && at.after(&step, 0.21).is_none());
-        assert!(prior_of(&[0.1, 0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).is_none());
+        let longer = Body::of(&[0.1, 0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        assert!(prior_of(&longer).is_none());
     }
 }

@@ -97,9 +97,9 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<FeasibleParameters, FitErro
     let (mut priors, mut given) = (Vec::with_capacity(links), Vec::with_capacity(links));
     for i in 0..links {
         let own = task.bodies.get(i).copied().flatten();
-        let own = own.and_then(|body| prior_of(&body.standard()));
+        let own = own.and_then(|body| prior_of(&body));
         given.push(own.is_some());
-        priors.extend(own.or_else(|| prior_of(&PLAIN.standard())));
+        priors.extend(own.or_else(|| prior_of(&PLAIN)));
     }
     let mut numbers = vec![PLAIN_DRIVE; drives];
     numbers.extend(rows.plain_friction());

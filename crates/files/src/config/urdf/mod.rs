@@ -28,6 +28,9 @@ use cft_ident_core::robot::tree::space::{Rotation, product};
 use cft_ident_logs::log::{named_beside, remedy, shown};
 use shapes::LinkShape;
 
+/// A limit that is none, as files of links write it [m, rad, and their rates and torques].
+pub const NO_LIMIT: f64 = 1e16;
+
 /// What a URDF gives to a robot file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UrdfChain {

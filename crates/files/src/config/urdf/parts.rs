@@ -7,7 +7,7 @@ use super::link::{Body, Link};
 use super::possible;
 use super::shapes::{numbers, of_link};
 use super::xml::{EXPAND, Element, MACRO};
-use super::{AngleConvention, UrdfPlace};
+use super::{AngleConvention, NO_LIMIT, UrdfPlace};
 use crate::config::ConfigError;
 use crate::config::angles::FileChanges;
 use crate::config::document::is_plain_name;
@@ -353,7 +353,7 @@ impl ElementReading<'_> {
         Ok((at("xyz")?, at("rpy")?))
     }
 
-    /// The limits of a joint, where they are given; 0 stands in many files for one that nobody knows.
+    /// The limits of a joint, where they are given; 0 stands in many files for one that nobody knows, and [`NO_LIMIT`] for none.
     fn limits(&self, joint: Element, kind: UrdfJointKind) -> Result<CoordinateLimits, ConfigError> {
         let Some(limit) = joint.child("limit") else {
             return Ok(CoordinateLimits::default());
@@ -366,9 +366,10 @@ impl ElementReading<'_> {
             return Err(self.wrong(limit, &problem, "exchange the two"));
         }
         Ok(CoordinateLimits {
-            position: (low < high && kind != UrdfJointKind::Continuous).then_some([low, high]),
-            speed: (speed > 0.0).then_some(speed),
-            torque: (effort > 0.0).then_some(effort),
+            position: (low < high && high < NO_LIMIT && kind != UrdfJointKind::Continuous)
+                .then_some([low, high]),
+            speed: (speed > 0.0 && speed < NO_LIMIT).then_some(speed),
+            torque: (effort > 0.0 && effort < NO_LIMIT).then_some(effort),
             ..CoordinateLimits::default()
         })
     }

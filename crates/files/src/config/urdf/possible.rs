@@ -1,13 +1,9 @@
 //! Inertials that no body has: a principal moment that is more than the sum of the other two, or below 0. They stay
 //! what they are, for a URDF of identified base parameters has such ones; a fit takes them for no prior.
 
-use nalgebra::Matrix3;
-
 use super::link::{Body, Link};
+use cft_ident_core::robot::standard::{self, WRITTEN};
 use cft_ident_logs::log::list;
-
-/// Share of the largest second moment below 0 that rounding of the file explains.
-const ROUNDED: f64 = 1e-3;
 
 /// A sentence that names the links whose inertia no body has.
 pub(super) fn impossible(links: &[Link]) -> Option<String> {
@@ -23,16 +19,14 @@ pub(super) fn impossible(links: &[Link]) -> Option<String> {
     })
 }
 
-/// By the second moments along the principal axes: half the trace less each moment.
 fn is_impossible(body: &Body) -> bool {
-    let inertia = Matrix3::from_fn(|i, j| body.inertia[i][j]);
-    if body.mass <= 0.0 || inertia.iter().any(|x| !x.is_finite()) {
-        return false;
-    }
-    let moments = inertia.symmetric_eigenvalues();
-    let second = moments.map(|moment| 0.5 * moments.sum() - moment);
-    let most = second.max();
-    most > 0.0 && second.min() < -ROUNDED * most
+    let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = body.inertia;
+    let written = standard::Body {
+        mass: body.mass,
+        centre: body.centre,
+        inertia: [xx, xy, xz, yy, yz, zz],
+    };
+    body.mass > 0.0 && written.physical(WRITTEN).is_none()
 }
 
 #[cfg(test)]

@@ -7,12 +7,15 @@ use super::parts::clean_name;
 use super::{no_xml, xml};
 use crate::config::ConfigError;
 
+/// The inertial of a link that weighs nothing. PyBullet gives one without inertial a kilogram.
+pub const WEIGHTLESS: &str = "<inertial><mass value=\"0\"/><inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/></inertial>";
+
 /// What is to stand in a URDF.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct UrdfEdits {
     /// `<inertial>` elements by link.
     pub inertials: BTreeMap<String, String>,
-    /// Links whose inertia is in another one: theirs goes.
+    /// Links whose inertia is in another one: theirs becomes none.
     pub bare: BTreeSet<String>,
     /// `<dynamics>` elements by joint.
     pub dynamics: BTreeMap<String, String>,
@@ -30,15 +33,25 @@ pub fn replaced(file: &str, text: &str, with: &UrdfEdits) -> Result<String, Conf
     let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
     let root = tree.root();
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
+    let joints = root.children().filter(|e| e.name() == "joint");
+    let fixed = joints.filter(|joint| joint.attribute("type") == Some("fixed"));
+    let fixed: BTreeSet<&str> = fixed
+        .filter_map(|joint| joint.child("child")?.attribute("link"))
+        .collect();
+    let weightless = WEIGHTLESS.to_owned();
     for element in root.children() {
         let name = element.attribute("name").unwrap_or_default();
+        let bare = with.bare.contains(name)
+            || (fixed.contains(name) && element.child("inertial").is_none());
         let (kind, anew) = match element.name() {
-            "link" => ("inertial", with.inertials.get(name)),
+            "link" => {
+                let anew = with.inertials.get(name);
+                ("inertial", anew.or(bare.then_some(&weightless)))
+            }
             "joint" => ("dynamics", with.dynamics.get(&*clean_name(name))),
             _ => continue,
         };
-        let goes = anew.is_some() || (kind == "inertial" && with.bare.contains(name));
-        if !goes {
+        if anew.is_none() {
             continue;
         }
         let old: Vec<Range<usize>> = element
@@ -79,6 +92,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn frames_that_are_fixed_say_that_they_weigh_nothing_and_the_root_says_nothing() {
+        let text = "<robot name=\"r\"><link name=\"base\"/><link name=\"a\"><inertial>own</inertial></link><link name=\"tcp\"/>\
+                    <joint name=\"f\" type=\"fixed\"><parent link=\"base\"/><child link=\"a\"/></joint>\
+                    <joint name=\"g\" type=\"fixed\"><parent link=\"a\"/><child link=\"tcp\"/></joint></robot>";
+        let found = replaced("r.urdf", text, &UrdfEdits::default()).unwrap();
+        let tcp = format!("<link name=\"tcp\">\n    {WEIGHTLESS}\n  </link>");
+        assert!(found.contains(&tcp), "{found}");
+        assert!(found.contains("<link name=\"base\"/>") && found.contains("own"));
+    }
+
+    #[test]
     fn only_inertials_and_dynamics_change() {
         let text = "<?xml version=\"1.0\"?>\n<robot name=\"r\">\n  <!-- <link name=\"a\"/> kept -->\n  \
                     <link name=\"a\"/>\n  <link name=\"b\"><visual><mesh name='x>y'/></visual><inertial>old</inertial></link>\n  \
@@ -100,8 +124,9 @@ mod tests {
                       <!-- <link name=\"a\"/> kept -->\n  \
                       <link name=\"a\">\n    <inertial>1</inertial>\n  </link>\n  \
                       <link name=\"b\"><visual><mesh name='x>y'/></visual><inertial>2</inertial></link>\n  \
-                      <link name=\"tool\"></link>\n  \
+                      <link name=\"tool\">NONE</link>\n  \
                       <joint name=\"j\" type=\"revolute\"><dynamics friction=\"3\"/><limit/></joint>\n</robot>\n";
+        let wanted = wanted.replace("NONE", WEIGHTLESS);
         assert_eq!(replaced("r.urdf", text, &with).unwrap(), wanted);
     }
 }

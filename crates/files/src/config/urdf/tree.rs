@@ -71,7 +71,10 @@ pub(super) fn chain(
             None => parent,
             Some(joint) => sit(joint, &parts.links[link].name, parent, &mut moving, place)?,
         };
-        if let (Some(on), Some(body)) = (seat.on, &parts.links[link].body) {
+        let body = parts.links[link].body.as_ref();
+        // a frame that says that it weighs nothing has no part in the link that carries it
+        let weighs = |body: &&Body| body.mass != 0.0 || body.inertia != [[0.0; 3]; 3];
+        if let (Some(on), Some(body)) = (seat.on, body.filter(weighs)) {
             moving[on].bodies.push(Body {
                 mass: body.mass,
                 centre: add(&seat.origin, &turn(&seat.rotation, &body.centre)),

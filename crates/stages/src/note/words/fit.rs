@@ -121,7 +121,7 @@ impl Display for FitNote {
             ),
             Self::ImpossibleBodies { links } => write!(
                 f,
-                "the `inertial` of {} in the robot file is that of no body that can exist (a negative mass or moment, or a moment above the sum of the other two): a plain body stands for it where the torques say nothing",
+                "the `inertial` of {} in the robot file is that of no body that can exist (a negative mass or moment, a moment above the sum of the other two, or no moments at all): a plain body stands for it where the torques say nothing",
                 links.join(", ")
             ),
             Self::DualityGap { gap } => write!(
