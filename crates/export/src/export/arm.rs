@@ -2,18 +2,17 @@
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
 
-use super::dissipative::{CURVES, damping_and_friction, nearest_sizes, speeds};
+use super::dissipative::{CURVES, damping_and_friction, friction_at, nearest_sizes, speeds};
 use super::error::ExportError;
 use super::prepared::{Drive, PreparedModel, drive, joint_name, placed, root};
-use super::turned::turned_base;
-use cft_ident_core::effect::as_code::RobotProperty;
-use cft_ident_core::effect::{AugmentedModel, EffectPlace, ModelEffect};
+use super::turned::{length, turned_base};
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::effect::as_code::{EffectsCode, RobotProperty};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::robot::JointKind;
-use cft_ident_core::robot::friction::sign;
 use cft_ident_core::robot::standard::{Body, COMPUTED, STANDARD};
 use cft_ident_core::robot::tree::JointCoupling;
-use cft_ident_core::robot::tree::space::{Rotation, Vector, cross, times};
+use cft_ident_core::robot::tree::space::{Rotation, UNTURNED, Vector, cross, times};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::robot_file::CoordinateLimits;
 use cft_ident_files::config::serial_section::FrameSection;
@@ -82,8 +81,10 @@ pub struct Arm {
     pub drives: Vec<f64>,
     /// Where the inertials come from.
     pub of_inertials: Vec<String>,
-    /// Places in the model of the effects that are in bodies, gravity and armatures.
+    /// Places in the model of the effects that are in bodies, gravity, armatures and friction.
     pub held: Vec<usize>,
+    /// Those of friction among them.
+    pub bent: Vec<usize>,
 }
 
 /// A link and the joint before it.
@@ -152,15 +153,16 @@ impl Arm {
         let (bodies, drives) = prepared.standard.values.split_at(links.len() * STANDARD);
         let (mut bodies, mut drives) = (bodies.to_vec(), drives.to_vec());
         drives.resize(robot.joints(), 0.0);
-        let (mut gravity, mut held) = (robot.tree().gravity(), Vec::new());
+        let bent = match settings.bends {
+            true => EffectsCode::of(refined)?.of_friction,
+            false => Vec::new(),
+        };
+        let (mut gravity, mut held) = (robot.tree().gravity(), bent.clone());
         for (i, effect) in refined.effects.iter().enumerate() {
             let property = effect.property();
             let stays = |property: &RobotProperty| {
                 settings.base == BaseFrame::Silent && matches!(property, RobotProperty::Gravity(_))
             };
-            if settings.bends && bent(effect, None).is_some() {
-                held.push(i);
-            }
             if let Some(property) = property.filter(|property| !stays(property)) {
                 fold(property, &mut bodies, &mut drives, &mut gravity);
                 held.push(i);
@@ -185,7 +187,7 @@ impl Arm {
             if body.is_point() {
                 points.push(link.name.as_str());
             }
-            out.push(prepared.link(i, body, &drives, refined, settings)?);
+            out.push(prepared.link(i, body, &drives, (refined, &bent), settings)?);
         }
         if !points.is_empty() {
             of_inertials.push(format!(
@@ -203,7 +205,21 @@ impl Arm {
             drives,
             of_inertials,
             held,
+            bent,
         })
+    }
+
+    /// How the base stands in the world of the file.
+    pub(super) fn standing(&self) -> Rotation {
+        self.turn.unwrap_or(UNTURNED)
+    }
+
+    /// Free fall in the world of the file \[m/s^2\].
+    pub fn world_gravity(&self) -> Vector {
+        match self.turn {
+            Some(_) => [0.0, 0.0, -length(&self.gravity)],
+            None => self.gravity,
+        }
     }
 
     /// The independent joints in the order of vectors.
@@ -241,7 +257,7 @@ impl PreparedModel {
         i: usize,
         body: Body,
         drives: &[f64],
-        refined: &AugmentedModel,
+        bent: (&AugmentedModel, &[usize]),
         settings: ArmSettings,
     ) -> Result<ArmLink, ExportError> {
         let robot = &self.model.robot;
@@ -251,7 +267,7 @@ impl PreparedModel {
         let (rotation, origin) = placed(link, &moved);
         let joint = match moved {
             Drive::Joint(j) => {
-                let [damping, friction, bend @ ..] = self.friction(j, refined, settings);
+                let [damping, friction, bend @ ..] = self.friction(j, bent, settings);
                 let limits = self.file.robot.limits.get(&name);
                 ArmJoint::Own(Box::new(OwnJoint {
                     limits: limits.cloned().unwrap_or_default(),
@@ -285,48 +301,33 @@ impl PreparedModel {
 }
 
 impl PreparedModel {
-    /// Sizes of the [`CURVES`] of joint `j`, none below zero.
-    fn friction(&self, j: usize, refined: &AugmentedModel, settings: ArmSettings) -> [f64; 4] {
+    /// Sizes of the [`CURVES`] of joint `j`, none below zero; effects `bent` of friction are in them.
+    fn friction(
+        &self,
+        j: usize,
+        (refined, bent): (&AugmentedModel, &[usize]),
+        settings: ArmSettings,
+    ) -> [f64; 4] {
         let law = &self.model.friction[j];
-        let bent: Vec<[f64; 2]> = match settings.bends {
-            true => refined
-                .effects
-                .iter()
-                .filter_map(|effect| bent(effect, Some(j)))
-                .collect(),
-            false => Vec::new(),
-        };
         let [damping, friction] = damping_and_friction(law).map(|x| x.max(0.0));
         let said = [damping, friction, 0.0, 0.0];
         if law.parameters() <= 2 && bent.is_empty() {
             return said;
         }
         let seen = self.file.held_out.get(j).map(|held| held.speed_seen);
-        let whole = |v: f64| {
-            let bent = bent
-                .iter()
-                .map(|[size, power]| size * sign(v) * v.abs().powf(*power));
-            law.torque(v) + bent.sum::<f64>()
-        };
+        let speeds = speeds(j, settings.along, seen);
+        let all = vec![speeds.clone(); self.model.robot.joints()];
+        let whole = friction_at(refined, bent, all).swap_remove(j);
         let curves = if settings.bends {
             &CURVES[..]
         } else {
             &CURVES[..2]
         };
-        let sizes = nearest_sizes(whole, curves, &speeds(j, settings.along, seen));
+        let sizes = nearest_sizes(&whole, curves, &speeds);
         sizes.map_or(said, |sizes| {
             std::array::from_fn(|k| sizes.get(k).copied().unwrap_or(0.0))
         })
     }
-}
-
-/// Size and power of an effect that is friction which bends with speed, of joint `j` where one is named.
-pub(super) fn bent(effect: &ModelEffect, j: Option<usize>) -> Option<[f64; 2]> {
-    let EffectPlace::Joint(at) = effect.place else {
-        return None;
-    };
-    let is = effect.name() == "nonlinear-viscous" && j.is_none_or(|j| j == at);
-    is.then(|| [effect.linear[0], effect.shape[0]])
 }
 
 /// The body of a link of these standard parameters, as readers take it.

@@ -42,18 +42,18 @@ pub(super) fn speeds(j: usize, along: &[Stretch], seen: Option<f64>) -> Vec<f64>
 /// Speeds at which a law is looked at where no motion says which.
 const STEPS: u32 = 100;
 
-/// Sizes of `curves`, none below zero, whose sum is nearest to a friction over these speeds; none where they do not tell.
+/// Sizes of `curves`, none below zero, whose sum is nearest to the friction at these speeds; none where they do not tell.
 pub(super) fn nearest_sizes(
-    friction: impl Fn(f64) -> f64,
+    friction: &[f64],
     curves: &[fn(f64) -> f64],
     speeds: &[f64],
 ) -> Option<Vec<f64>> {
     let n = curves.len();
     let (mut square, mut with) = (DMatrix::zeros(n, n), DVector::zeros(n));
-    for v in speeds {
+    for (v, friction) in speeds.iter().zip(friction) {
         let row = DVector::from_iterator(n, curves.iter().map(|curve| curve(*v)));
         square += &row * row.transpose();
-        with += row * friction(*v);
+        with += row * *friction;
     }
     // of few curves each subset is tried: the best of those whose sizes are not below zero is the nearest
     let subsets = (1..1_usize << n).map(|bits| (0..n).filter(|k| bits >> k & 1 == 1).collect());
@@ -78,7 +78,11 @@ const PER_DECADE: i32 = 20;
 const DECADES: [i32; 2] = [-6, 2];
 
 /// Friction of each joint at its speeds `v`, with its effects among those of a speed alone (`of_friction`).
-fn friction_at(refined: &AugmentedModel, of_friction: &[usize], v: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+pub(super) fn friction_at(
+    refined: &AugmentedModel,
+    of_friction: &[usize],
+    v: Vec<Vec<f64>>,
+) -> Vec<Vec<f64>> {
     let rows = v.first().map_or(0, Vec::len);
     let rest = || vec![vec![0.0; rows]; v.len()];
     let along = Stretch {
@@ -210,19 +214,21 @@ mod tests {
     #[test]
     fn sizes_are_the_nearest_of_those_that_are_not_below_zero() {
         let speeds: Vec<f64> = (-50..=50).map(|k| 0.04 * f64::from(k)).collect();
-        let law = |v: f64| 0.7 * v + 2.0 * sign(v) + 0.3 * v * v * v;
-        let all = nearest_sizes(law, &CURVES, &speeds).unwrap();
+        let law = |v: &f64| 0.7 * v + 2.0 * sign(*v) + 0.3 * v * v * v;
+        let friction: Vec<f64> = speeds.iter().map(law).collect();
+        let all = nearest_sizes(&friction, &CURVES, &speeds).unwrap();
         for (size, wanted) in all.iter().zip([0.7, 2.0, 0.0, 0.3]) {
             assert!((size - wanted).abs() < 1e-9, "{all:?}");
         }
         // a fall with speed is none, and its level the mean
-        let falling = nearest_sizes(|v| sign(v) * (2.0 - 0.3 * v.abs()), &CURVES[..2], &speeds);
-        let falling = falling.unwrap();
+        let law = |v: &f64| sign(*v) * (2.0 - 0.3 * v.abs());
+        let friction: Vec<f64> = speeds.iter().map(law).collect();
+        let falling = nearest_sizes(&friction, &CURVES[..2], &speeds).unwrap();
         assert_eq!(falling[0], 0.0);
         assert!(
             (falling[1] - (2.0 - 0.3 * 1.02)).abs() < 1e-9,
             "{falling:?}"
         );
-        assert_eq!(nearest_sizes(law, &CURVES, &[]), None);
+        assert_eq!(nearest_sizes(&[], &CURVES, &[]), None);
     }
 }

@@ -2,17 +2,18 @@
 
 use serde::Serialize;
 
-use super::arm::{Arm, FormatSupport, bent};
-use super::dissipative::{CURVES, damping_and_friction, scene};
+use super::arm::{Arm, FormatSupport};
+use super::dissipative::{CURVES, damping_and_friction, friction_at, scene};
 use super::error::ExportError;
 use super::prepared::hashed;
+use super::turned::length;
 use cft_ident_core::effect::{AugmentedModel, shifted};
 use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
 use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::friction::sign;
 use cft_ident_core::robot::tree::Tree;
-use cft_ident_core::robot::tree::space::Vector;
+use cft_ident_core::robot::tree::space::{Vector, times};
 
 /// A part of the model's torque that a file does not hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -101,6 +102,7 @@ fn parts<'a>(
             }),
         });
     };
+    let mut beside = Vec::new();
     for joint in arm.joints() {
         let (j, name) = (joint.index, &names[joint.index]);
         let offset = model.offset[j];
@@ -121,30 +123,31 @@ fn parts<'a>(
         let law = model.friction[j];
         let [bend, cube] = joint.bend;
         let sizes = [joint.damping, joint.friction, bend, cube];
-        let held = refined.effects.iter().enumerate();
-        let held = held.filter(|(i, _)| arm.held.contains(i));
-        let bent: Vec<[f64; 2]> = held
-            .filter_map(|(_, effect)| bent(effect, Some(j)))
-            .collect();
         let differs = damping_and_friction(&law) != [sizes[0], sizes[1]];
-        if differs || law.parameters() > 2 || !bent.is_empty() {
-            of_joint(
-                format!("the friction law of {name} beside damping and friction"),
-                j,
-                Box::new(move |v, _| {
-                    let bent = bent
-                        .iter()
-                        .map(|[size, power]| size * sign(v) * v.abs().powf(*power));
-                    let said = CURVES
-                        .iter()
-                        .zip(sizes)
-                        .map(|(curve, size)| size * curve(v));
-                    law.torque(v) + bent.sum::<f64>() - said.sum::<f64>()
-                }),
-            );
+        if differs || law.parameters() > 2 || !arm.bent.is_empty() {
+            beside.push((j, sizes));
         }
     }
-    if let Some((what, off)) = arm.gravity_said(says) {
+    out.extend(beside.into_iter().map(|(j, sizes)| OmittedPart {
+        what: format!(
+            "the friction law of {} beside damping and friction",
+            names[j]
+        ),
+        of_reader: false,
+        torque: Box::new(move |s, _| {
+            let mut all = vec![vec![0.0; s.len()]; n];
+            all[j] = friction_at(refined, &arm.bent, s.v.clone()).swap_remove(j);
+            for (rest, v) in all[j].iter_mut().zip(&s.v[j]) {
+                let said = CURVES
+                    .iter()
+                    .zip(sizes)
+                    .map(|(curve, size)| size * curve(*v));
+                *rest -= said.sum::<f64>();
+            }
+            all
+        }),
+    }));
+    if let Some((what, off)) = arm.gravity_skipped(says) {
         out.push(OmittedPart {
             what,
             of_reader: true,
@@ -199,7 +202,30 @@ fn parts<'a>(
     out
 }
 
+/// Acceleration of free fall that readers take where they skip what the file says \[m/s^2\].
+const EARTH: f64 = 9.81;
+
 impl Arm {
+    /// Free fall in the frame of the base less that which readers take who skip what a file says, and what is said of it;
+    /// none where it is one, or where no reader skips it.
+    fn gravity_skipped(&self, says: FormatSupport) -> Option<(String, Vector)> {
+        let [x, y, z] = self.gravity;
+        let taken = match self.turn {
+            Some(_) => times(EARTH / length(&self.gravity), &self.gravity),
+            None => [0.0, 0.0, -EARTH],
+        };
+        let off = [x - taken[0], y - taken[1], z - taken[2]];
+        // gravity of sixteen digits is that of the earth
+        let who = says
+            .gravity_skipped_by
+            .filter(|_| length(&off) > 1e-12 * EARTH)?;
+        let [x, y, z] = self.world_gravity().map(|x| number::significant(x, 6));
+        let said = format!(
+            "gravity along ({x}, {y}, {z}) m/s^2, for which {who} (0, 0, -9.81): set it there"
+        );
+        Some((said, off))
+    }
+
     /// Torques that hold the arm along a stretch in a gravity of its own \[m/s^2\].
     fn held_in(&self, robot: &Robot, gravity: Vector, s: &Stretch) -> Vec<Vec<f64>> {
         let (n, links) = (robot.joints(), robot.tree().links().to_vec());

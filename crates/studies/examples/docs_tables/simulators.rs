@@ -19,46 +19,82 @@ pub fn left_out(result: &Value) -> String {
 /// What each reader takes of the numbers of joints.
 pub fn readers(result: &Value) -> String {
     let facts = rows(&result["facts"]);
-    let mut places: Vec<[&str; 2]> = facts.iter().map(|of| [text(&of["reader"]), text(&of["format"])]).collect();
+    let mut places: Vec<[&str; 2]> = facts
+        .iter()
+        .map(|of| [text(&of["reader"]), text(&of["format"])])
+        .collect();
     places.dedup();
     let numbers = ["damping", "friction", "armature", "effort"];
     let each = places.iter().map(|[reader, format]| {
         let arrives = |number: &&str| {
             let mut facts = facts.iter();
             let found = facts.find(|of| {
-                [text(&of["reader"]), text(&of["format"]), text(&of["number"])] == [*reader, *format, **number]
+                [
+                    text(&of["reader"]),
+                    text(&of["format"]),
+                    text(&of["number"]),
+                ] == [*reader, *format, **number]
             });
             found.map_or("-", |of| text(&of["arrives"])).to_owned()
         };
         let head = [(*reader).to_owned(), (*format).to_owned()];
-        head.into_iter().chain(numbers.iter().map(arrives)).collect()
+        head.into_iter()
+            .chain(numbers.iter().map(arrives))
+            .collect()
     });
     let versions = result["versions"].as_object().into_iter().flatten();
-    let versions: Vec<String> = versions.map(|(name, of)| format!("{name} {}", text(of))).collect();
-    let columns = ["<reader", "<format", "<damping", "<friction", "<armature", "<effort limit"];
+    let versions: Vec<String> = versions
+        .map(|(name, of)| format!("{name} {}", text(of)))
+        .collect();
+    let columns = [
+        "<reader",
+        "<format",
+        "<damping",
+        "<friction",
+        "<armature",
+        "<effort limit",
+    ];
     let table = table(&columns, &each.collect::<Vec<_>>());
-    format!("{}, {}\n\n{table}", versions.join(", "), text(&result["date"]))
+    format!(
+        "{}, {}\n\n{table}",
+        versions.join(", "),
+        text(&result["date"])
+    )
 }
 
 /// What readers make of small files, a column a reader.
 pub fn probes(result: &Value) -> String {
     let lines = rows(&result["probes"]);
     let readers = ["mujoco", "pinocchio", "drake", "newton", "bullet"];
-    let mut places: Vec<[&str; 2]> = lines.iter().map(|of| [text(&of["format"]), text(&of["what"])]).collect();
+    let mut places: Vec<[&str; 2]> = lines
+        .iter()
+        .map(|of| [text(&of["format"]), text(&of["what"])])
+        .collect();
     let mut seen = std::collections::BTreeSet::new();
     places.retain(|place| seen.insert(*place));
     let each = places.iter().map(|[format, what]| {
         let becomes = |reader: &&str| {
             let mut lines = lines.iter();
             let found = lines.find(|of| {
-                [text(&of["reader"]), text(&of["format"]), text(&of["what"])] == [*reader, *format, *what]
+                [text(&of["reader"]), text(&of["format"]), text(&of["what"])]
+                    == [*reader, *format, *what]
             });
             found.map_or("-", |of| text(&of["becomes"])).to_owned()
         };
         let head = [(*format).to_owned(), (*what).to_owned()];
-        head.into_iter().chain(readers.iter().map(becomes)).collect()
+        head.into_iter()
+            .chain(readers.iter().map(becomes))
+            .collect()
     });
-    let columns = ["<format", "<in the file", "<MuJoCo", "<Pinocchio", "<Drake", "<newton", "<PyBullet"];
+    let columns = [
+        "<format",
+        "<in the file",
+        "<MuJoCo",
+        "<Pinocchio",
+        "<Drake",
+        "<newton",
+        "<PyBullet",
+    ];
     table(&columns, &each.collect::<Vec<_>>())
 }
 
@@ -69,7 +105,11 @@ pub fn same_robot(results: &[&str]) -> Rendered {
     for result in results {
         let result = json(result)?;
         for row in rows(&result["rows"]) {
-            let key = if text(&row["reader"]) == "newton" { "largest" } else { "joint" };
+            let key = if text(&row["reader"]) == "newton" {
+                "largest"
+            } else {
+                "joint"
+            };
             let size = match row[key].as_f64() {
                 Some(size) => format!("{size:.0e}"),
                 None => "refused".to_owned(),
@@ -96,8 +136,13 @@ pub fn same_robot(results: &[&str]) -> Rendered {
         let head = [(*place).to_owned()];
         head.into_iter().chain(robots.iter().map(size)).collect()
     });
-    let columns = ["<format, reader"].into_iter().chain(robots.iter().copied());
-    Ok(table(&columns.collect::<Vec<_>>(), &each.collect::<Vec<_>>()))
+    let columns = ["<format, reader"]
+        .into_iter()
+        .chain(robots.iter().copied());
+    Ok(table(
+        &columns.collect::<Vec<_>>(),
+        &each.collect::<Vec<_>>(),
+    ))
 }
 
 /// Errors of windows that were replayed in a simulator.
