@@ -33,7 +33,7 @@ pub fn readers(result: &Value) -> String {
                     text(&of["reader"]),
                     text(&of["format"]),
                     text(&of["number"]),
-                ] == [*reader, *format, **number]
+                ] == [*reader, *format, *number]
             });
             found.map_or("-", |of| text(&of["arrives"])).to_owned()
         };
