@@ -54,6 +54,7 @@ mod mesh_capsules;
 mod mixed_rates;
 mod new_any_log;
 mod one_joint_logs;
+mod options;
 mod pipeline;
 mod printed_is_written;
 mod reduced;
