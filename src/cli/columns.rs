@@ -7,13 +7,14 @@ use cft_ident_logs::inspect::{
     is_time,
 };
 use cft_ident_logs::log::{self, DeclaredChannels, Layout, RawReader};
+use cft_ident_logs::mapping::ClockColumn;
 use cft_ident_stages::identify::RobotSetup;
 
 /// Channels by their names alone.
 pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>), CliError> {
     let time = match log.is_timed() && !log.is_recording() {
         true => None,
-        false => Some(time_column(log)?),
+        false => ClockColumn::find(log).map(|time| Some((time.place, time.seconds)))?,
     };
     let columns = 0..log.names().len();
     let channels = columns.filter(|column| time.is_none_or(|(time, _)| time != *column));
@@ -27,25 +28,6 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>)
         band_hz: None,
     };
     Ok((plan, Vec::new()))
-}
-
-/// Place of the time, and seconds per unit of it.
-pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError> {
-    let names = log.names();
-    let time = names.iter().position(|name| is_time(name));
-    let time = time.or(log.split_clock()).ok_or_else(|| {
-        CliError::input(format!("{}: no column is a time", log.log_name()))
-        .hint(format!("the header has {}", log::list(names.iter().map(String::as_str))))
-        .hint("name the time column, `time = ..`, or say the rate, `rate_hz = ..`, in [log] of a robot file and give it with -r")
-        .hint("`cft-ident new NAME --log LOG --rate HZ` writes such a file")
-    })?;
-    // `time [ms]`, or `time_ms`
-    let suffix = || names[time].rsplit_once('_').map(|(_, unit)| unit);
-    let stated = seconds(log.unit(time).or_else(suffix));
-    match stated {
-        Some(seconds) => Ok((time, seconds)),
-        None => Ok((time, log.set_time_by_numbers(time)?)),
-    }
 }
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from reading the log.
@@ -191,17 +173,6 @@ pub(super) fn unit_of_joint(name: &str) -> Option<&str> {
         "deg", "mm", "cm", "A", "V", "counts", "deg/s", "mm/s", "Nmm", "rpm",
     ];
     known.contains(&unit).then_some(unit)
-}
-
-/// Seconds per unit of a time column, where the unit is one of time.
-fn seconds(unit: Option<&str>) -> Option<f64> {
-    match unit?.to_lowercase().as_str() {
-        "s" | "sec" => Some(1.0),
-        "ms" => Some(1e-3),
-        "us" | "µs" | "μs" => Some(1e-6),
-        "ns" => Some(1e-9),
-        _ => None,
-    }
 }
 
 /// Limits of a channel, and whether a number at the limit is what was applied.

@@ -11,6 +11,7 @@ use cft_ident_logs::log::{
     Block, Instant, JointTemperatures, Layout, LogSection, LogSpec, Provenance, RawBlock,
     RawReader, Reader, escape,
 };
+use cft_ident_logs::mapping::ClockColumn;
 use cft_ident_logs::output::{LogForm, LogWriter};
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_stages::identify::{RobotSetup, repeated_files};
@@ -149,7 +150,10 @@ fn as_it_stands(
     let name = escape(&spec.name());
     let (time, seconds) = match log.is_recording() {
         true => (0, 1.0),
-        false => columns::time_column(&mut log)?,
+        false => {
+            let time = ClockColumn::find(&mut log)?;
+            (time.place, time.seconds)
+        }
     };
     log.set_time(time, seconds);
     let others: Vec<usize> = (0..log.names().len()).filter(|k| *k != time).collect();

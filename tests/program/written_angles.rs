@@ -3,7 +3,7 @@
 
 use crate::measured_support;
 
-use cft_ident::config::{RobotFile, UrdfChain};
+use cft_ident::config::{ChainRequest, RobotFile, UrdfChain};
 use measured_support::shared;
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
@@ -140,7 +140,7 @@ fn a_parent_that_no_link_declares_is_the_root() {
     let Some(path) = shared("pendulum/double_pendulum.urdf") else {
         return;
     };
-    let chain = UrdfChain::load(&path, None).unwrap();
+    let chain = UrdfChain::load(&path, &ChainRequest::default()).unwrap();
     let joints: Vec<&str> = chain
         .links
         .iter()

@@ -1,17 +1,18 @@
 //! `cft-ident new`: a robot file for a robot that the tool has never seen.
 
+mod held;
 mod text;
 mod weights;
 
+use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, file_name, inspect, typed};
+use super::{CliError, Context, Outcome, file_name, inspect};
 use cft_ident_core::robot::JointKind;
-use cft_ident_files::config::serial_section::LinkSection;
-use cft_ident_files::config::{DeclaredCapsules, RobotFile, UrdfChain};
+use cft_ident_files::config::{DeclaredCapsules, RobotFile};
 use cft_ident_logs::inspect::{LogFault, Severity};
 use cft_ident_logs::log::{LogSpec, Provenance, Reader, escape};
 use cft_ident_logs::mapping::{
@@ -21,6 +22,7 @@ use cft_ident_plant::excite::space::always_touching;
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::table::{CellAlignment, Table, hanging};
 use cft_ident_stages::identify::RobotSetup;
+use held::{arm_alone, chain_of, has_columns, joints_of};
 use text::DraftInputs;
 
 const EXAMPLE: &str = "\
@@ -67,7 +69,11 @@ pub(super) fn rate(text: &str) -> Result<f64, String> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum DraftShape {
     /// A URDF beside the robot file, by the path that the file will hold.
-    Urdf { path: String, tip: Option<String> },
+    Urdf {
+        path: String,
+        tip: Option<String>,
+        held: BTreeMap<String, f64>,
+    },
     /// Rows of a table to be filled in.
     Rows,
     /// One joint.
@@ -248,11 +254,13 @@ pub(super) fn describe(
     context: &Context,
 ) -> Result<RobotDraft, CliError> {
     let urdf = args.urdf.as_deref();
-    let chain = urdf.map(|path| UrdfChain::load(path, args.tip.as_deref()));
-    let chain = chain.transpose()?;
-    let both = chain.as_ref().zip(urdf);
-    let capsules = both.map(|(chain, path)| chain.capsules(path));
-    let known: Option<Vec<UrdfJoint>> = chain.as_ref().map(joints_of);
+    let load = |held: &BTreeMap<String, f64>| {
+        let chain = urdf.map(|path| chain_of(path, args.tip.as_deref(), held));
+        chain.transpose()
+    };
+    let mut held = BTreeMap::new();
+    let mut chain = load(&held)?;
+    let mut known: Option<Vec<UrdfJoint>> = chain.as_ref().map(joints_of);
     let asked = LogHints {
         rate_hz: args.rate,
         topic: args.topic.clone(),
@@ -265,6 +273,17 @@ pub(super) fn describe(
     let seen = seen.transpose()?;
     drop(bar);
     let mut mapping = Mapping::of(known.as_deref(), seen.as_ref());
+    if let (Some(all), Some(_)) = (&chain, &seen) {
+        held = held::before_arm(all, &mapping);
+    }
+    if let Some(check) = held::check(&held) {
+        chain = load(&held)?;
+        known = chain.as_ref().map(joints_of);
+        mapping = Mapping::of(known.as_deref(), seen.as_ref());
+        mapping.checks.push(check);
+    }
+    let both = chain.as_ref().zip(urdf);
+    let capsules = both.map(|(chain, path)| chain.capsules(path));
     if let ([alone], None) = (&mut mapping.joints[..], &known) {
         // a column says what it is of, and not always of which joint
         alone.joint = joint_name(target);
@@ -273,6 +292,7 @@ pub(super) fn describe(
         (Some(path), _) => DraftShape::Urdf {
             path: beside(path, target),
             tip: args.tip.clone(),
+            held: held.clone(),
         },
         (None, 0 | 1) => DraftShape::Single(mapping.kind()),
         (None, _) => DraftShape::Rows,
@@ -323,7 +343,7 @@ pub(super) fn describe(
         warnings.push(text);
     }
     let arm = chain.as_ref();
-    let arm = arm.and_then(|chain| arm_alone(chain, &mapping, args));
+    let arm = arm.and_then(|chain| arm_alone(chain, &mapping, &held, args));
     if let Some(command) = &arm {
         let without = mapping.joints.iter().filter(|joint| !has_columns(joint));
         warnings.push(format!(
@@ -342,38 +362,6 @@ pub(super) fn describe(
         warnings,
         mapping,
         seen,
-    })
-}
-
-fn has_columns(joint: &JointColumns) -> bool {
-    joint.position.is_some() && joint.torque.is_some()
-}
-
-/// The command that ends the arm at the last joint that was logged, where the joints up to there are those of the log: a
-/// gripper, wheels or a head that were not logged.
-fn arm_alone(chain: &UrdfChain, mapping: &Mapping, args: &Args) -> Option<String> {
-    let logged: Vec<&str> = mapping
-        .joints
-        .iter()
-        .filter(|joint| has_columns(joint))
-        .map(|joint| joint.joint.as_str())
-        .collect();
-    let last = *logged
-        .last()
-        .filter(|_| logged.len() < mapping.joints.len())?;
-    let of_last = |link: &&LinkSection| link.joint.as_deref() == Some(last);
-    let tip = chain.links.iter().find(of_last)?.name.as_ref()?;
-    let (urdf, log) = (args.urdf.as_ref()?, args.log.as_ref()?);
-    let arm = UrdfChain::load(urdf, Some(tip)).ok()?;
-    let joints: Vec<UrdfJoint> = joints_of(&arm);
-    let same = joints.iter().map(|joint| joint.name.as_str()).eq(logged);
-    same.then(|| {
-        format!(
-            "cft-ident new {}-arm --urdf {} --tip {tip} --log {}",
-            args.name.display(),
-            typed::quoted(&urdf.to_string_lossy()),
-            typed::quoted(&log.to_string())
-        )
     })
 }
 
@@ -447,19 +435,6 @@ fn inspected(faults: Option<&[LogFault]>) -> String {
 }
 
 /// The independent joints of a URDF, their kinds and their largest torques.
-fn joints_of(chain: &UrdfChain) -> Vec<UrdfJoint> {
-    let of = |link: &LinkSection| {
-        let name = link.joint.clone()?;
-        let limits = chain.limits.iter().find(|(joint, _)| *joint == name);
-        Some(UrdfJoint {
-            kind: link.kind.unwrap_or(JointKind::Revolute),
-            torque: limits.and_then(|(_, limits)| limits.torque),
-            name,
-        })
-    };
-    chain.links.iter().filter_map(of).collect()
-}
-
 /// The path of a file as another one may name it: from the folder of that one.
 fn beside(file: &Path, from: &Path) -> String {
     let folder = match from.parent() {

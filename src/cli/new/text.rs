@@ -148,7 +148,7 @@ impl DraftInputs<'_> {
         let serial = "# gravity = [0.0, 0.0, -9.81]   # free fall in the frame of the base; turn it where the base is tilted\n\
                       # drive_inertia = false         # where torques are measured behind the gears, on the link side\n";
         match &self.shape {
-            DraftShape::Urdf { path, tip } => {
+            DraftShape::Urdf { path, tip, held } => {
                 let _ = writeln!(
                     out,
                     "urdf = {}   # from the folder of this file",
@@ -158,6 +158,17 @@ impl DraftInputs<'_> {
                     Some(tip) => format!("tip = {}\n", quoted(tip)),
                     None => "# tip = \"tool0\"               # link where the chain ends, where the URDF branches\n".to_owned(),
                 });
+                let each = held
+                    .iter()
+                    .map(|(joint, at)| format!("{} = {at:?}", key(joint)));
+                let each: Vec<String> = each.collect();
+                if !each.is_empty() {
+                    let _ = writeln!(
+                        out,
+                        "held = {{ {} }}   # CHECK IT: joints without columns, and where they stand still [rad or m]",
+                        each.join(", ")
+                    );
+                }
                 out.push_str(serial);
             }
             DraftShape::Single(kind) => {
@@ -252,7 +263,7 @@ impl DraftInputs<'_> {
             out,
             "\n# Columns of each joint, {}.\n\
              # More keys: position_unit, position_sign, position_scale, position_offset,\n\
-             # torque_unit, torque_sign, torque_scale (gear ratio times torque constant).\n[log.joint]\n",
+             # torque_unit, torque_sign, torque_scale (gear ratio times torque constant), torque_wrap.\n[log.joint]\n",
             self.mapping.how
         );
         lines.iter().for_each(|line| *out += &format!("{line}\n"));
@@ -326,7 +337,15 @@ impl DraftInputs<'_> {
                 if name != "t" || !guessed.is_empty() {
                     let _ = writeln!(out, "time = {}{guessed}", column(name));
                 }
-                let mut units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)].into_iter();
+                let mut units = [
+                    ("ms", 1e-3),
+                    ("us", 1e-6),
+                    ("ns", 1e-9),
+                    ("min", 60.0),
+                    ("h", 3600.0),
+                    ("d", 86_400.0),
+                ]
+                .into_iter();
                 if let Some((unit, _)) = units.find(|(_, size)| size == seconds) {
                     let _ = writeln!(out, "time_unit = {}", quoted(unit));
                 }
@@ -392,15 +411,15 @@ fn columns(joint: &JointColumns, recording: bool) -> Option<String> {
             keys.push(format!("{what} = {}", column(found)));
         }
     }
-    let counts = joint.position_unit == Some("counts");
-    let scale = joint.position_scale.or(counts.then_some(1.0));
     let number = |x: f64| format!("{x:?}");
     let values = [
         ("position_unit", joint.position_unit.map(quoted)),
-        ("position_scale", scale.map(number)),
+        ("position_scale", joint.position_scale.map(number)),
+        ("position_offset", joint.position_offset.map(number)),
         ("wrap", joint.wrap.map(number)),
         ("torque_unit", joint.torque_unit.map(quoted)),
         ("torque_scale", joint.torque_scale.map(number)),
+        ("torque_wrap", joint.torque_wrap.map(number)),
     ];
     let given = values
         .into_iter()

@@ -349,3 +349,106 @@ fn the_heavy_arm_and_the_pendulum_are_mapped_by_number() {
         serde_json::json!([ANGLE_CHECK, TORQUE_CHECK])
     );
 }
+
+/// One joint at 100 Hz; `stamp` writes the time of a row.
+fn one_joint(header: &str, torque: &dyn Fn(f64) -> f64, stamp: &dyn Fn(usize) -> String) -> String {
+    let row = |k: usize| {
+        let t = 0.01 * k as f64;
+        let q = (0.9 * t).sin() + 0.4 * (2.3 * t).sin();
+        format!("{},{q:.6},{}\n", stamp(k), torque(t))
+    };
+    let rows: String = (0..2000).map(row).collect();
+    format!("{header}\n{rows}")
+}
+
+fn smooth(t: f64) -> f64 {
+    (3.0 * (1.1 * t).sin() * 1e4).round() / 1e4
+}
+
+#[test]
+fn times_without_a_name_are_found_by_every_command_alike() {
+    let numbers = |k: usize| format!("{:.3}", 5.0 + 0.01 * k as f64);
+    let dates = |k: usize| {
+        let (s, ms) = (k / 100, 10 * (k % 100));
+        format!("2026-01-02T03:04:{:02}.{ms:03}", s % 60)
+    };
+    let days = |k: usize| format!("{:.12}", 739_740.395_833 + 0.01 * k as f64 / 86_400.0);
+    for (header, stamp) in [
+        (",q,tau", &numbers as &dyn Fn(usize) -> String),
+        (",q,tau", &dates),
+        ("log.t,log.q,log.tau", &numbers),
+        ("timestamps,q,tau", &numbers),
+        ("datenum,q,tau", &days),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = one_joint(header, &smooth, stamp);
+        std::fs::write(folder.path().join("log.csv"), text).unwrap();
+        for words in [
+            "inspect log.csv",
+            "convert log.csv out.csv",
+            "new x --log log.csv",
+        ] {
+            let found = document(folder.path(), &words.split(' ').collect::<Vec<_>>());
+            if !words.starts_with("convert") {
+                let rate = found["rate_hz"].as_f64().unwrap();
+                assert!((rate / 100.0 - 1.0).abs() < 1e-3, "{header}: {rate}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_no_recorder_has_is_refused_at_once_with_the_unit_to_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let hours = |k: usize| format!("{:.12}", 0.01 * k as f64 / 3600.0);
+    let text = one_joint("t,q,tau", &smooth, &hours);
+    std::fs::write(folder.path().join("log.csv"), text).unwrap();
+    for words in ["inspect log.csv", "new x --log log.csv"] {
+        command(folder.path())
+            .args(words.split(' '))
+            .assert()
+            .code(3)
+            .stderr(contains("no recorder is that fast").and(contains("time_unit = \"h\"")));
+    }
+}
+
+#[test]
+fn signed_words_that_are_logged_as_unsigned_get_the_line_that_reads_them() {
+    let word = |t: f64| (150.0 * (1.1 * t).sin()).round().rem_euclid(65_536.0);
+    let neighbour = |t: f64| 655_360.0 + word(t);
+    let stamp = |k: usize| format!("{:.3}", 0.01 * k as f64);
+    for torque in [&word as &dyn Fn(f64) -> f64, &neighbour] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = one_joint("time,position,torque", torque, &stamp);
+        std::fs::write(folder.path().join("log.csv"), text).unwrap();
+        let found = document(folder.path(), &["new", "x", "--log", "log.csv"]);
+        let robot = std::fs::read_to_string(folder.path().join("x.toml")).unwrap();
+        assert!(robot.contains("torque_wrap = 65536.0"), "{robot}");
+        let faults = found["faults"].to_string();
+        assert!(!faults.contains("unsigned"), "{faults}");
+        let without = robot.replace(", torque_wrap = 65536.0", "");
+        std::fs::write(folder.path().join("x.toml"), without).unwrap();
+        for words in [
+            "lsq log.csv -r x.toml -o m.toml",
+            "identify log.csv x.toml -o run",
+        ] {
+            command(folder.path())
+                .args(words.split(' '))
+                .assert()
+                .code(3)
+                .stderr(contains("leaps by 65536").and(contains("torque_wrap = 65536")));
+        }
+    }
+}
+
+#[test]
+fn runs_of_one_table_are_parted_and_no_row_is_lost_between_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let stamp = |k: usize| format!("{},{:.3}", k / 500, 0.01 * (k % 500) as f64);
+    let text = one_joint("episode,time,position,torque", &smooth, &stamp);
+    std::fs::write(folder.path().join("log.csv"), text).unwrap();
+    let found = document(folder.path(), &["inspect", "log.csv"]);
+    assert_eq!(found["gaps"], serde_json::json!([]));
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("4 runs of 2000 rows"), "{warnings}");
+}

@@ -88,6 +88,16 @@ impl RobotFile {
             .collect()
     }
 
+    /// Joints whose positions are logged in counts, and whose file does not say how much one is.
+    pub fn without_scale(&self) -> Vec<&str> {
+        let counts = |(_, channels): &(&String, &JointChannels)| {
+            channels.position_unit == Some(PositionUnit::COUNTS)
+                && channels.position_scale.is_none()
+        };
+        let joints = self.log.joint.iter().filter(counts);
+        joints.map(|(joint, _)| joint.as_str()).collect()
+    }
+
     /// Unit that stands for that of the torque in inertial parameters, which joints share: the first
     /// that is no torque, else N or Nm.
     pub fn inertial_torque_unit(&self) -> &'static str {
@@ -192,6 +202,7 @@ impl RobotFile {
                 || key("torque"),
             )
             .said(given.torque_unit.is_some(), given.torque_scale);
+            layout.torques[index].wrap = given.torque_wrap.map(|range| (range * gain).abs());
         }
         if let Some(asked) = &self.log.torque {
             let named = self.commands(asked, robot.joint_names());

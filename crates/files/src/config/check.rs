@@ -34,6 +34,7 @@ fn robot(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigError> {
         ("drive_inertia", robot.drive_inertia.is_some(), Serial),
         ("urdf", robot.urdf.is_some(), Serial),
         ("tip", robot.tip.is_some(), Serial),
+        ("held", !robot.held.is_empty(), Serial),
         (
             "angles_as_written",
             robot.angles_as_written.is_some(),

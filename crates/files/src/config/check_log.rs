@@ -214,8 +214,8 @@ fn joint_channels(
 ) -> Result<(), ConfigError> {
     let at = |key| ["log", "joint", joint, key];
     let position_fits = match channels.position_unit {
-        None => true,
-        Some(PositionUnit::COUNTS) => channels.position_scale.is_some(),
+        // what reads positions in counts asks for their scale
+        None | Some(PositionUnit::COUNTS) => true,
         Some(unit) => match kind {
             JointKind::Prismatic => unit.is_length(),
             JointKind::Revolute => unit.is_angle(),
@@ -223,9 +223,6 @@ fn joint_channels(
     };
     if !position_fits {
         let remedy = match kind {
-            _ if channels.position_unit == Some(PositionUnit::COUNTS) => {
-                "give `position_scale`, metres or radians per count"
-            }
             JointKind::Prismatic => {
                 "a prismatic joint is logged in \"m\", \"cm\" or \"mm\", or another length"
             }
@@ -253,6 +250,7 @@ fn joint_channels(
     scale(document, &at("position_scale"), channels.position_scale)?;
     scale(document, &at("torque_scale"), channels.torque_scale)?;
     range(document, &at("wrap"), channels.wrap)?;
+    range(document, &at("torque_wrap"), channels.torque_wrap)?;
     let remedy = "give the largest torque that the drive delivers, above 0";
     let positive = |x: f64| x > 0.0 && x.is_finite();
     document.number(&at("torque_limit"), channels.torque_limit, positive, remedy)?;
@@ -302,8 +300,7 @@ fn actuator_channels(
 }
 
 fn range(document: &TomlDocument, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
-    let remedy =
-        "give the range of the encoder in the unit of its column: 360, 6.283185307179586, 4096";
+    let remedy = "give the range after which the numbers of the column begin anew, in their unit: 360, 6.283185307179586, 4096, 65536";
     document.number(at, value, |x| x > 0.0 && x.is_finite(), remedy)
 }
 

@@ -69,6 +69,10 @@ pub struct RobotSection {
     /// Link of the URDF where the chain ends; every branch is read where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
+    /// Joints of the URDF that no log has and that stand still, and where \[m or rad\]: a stand, a rail, a torso. What
+    /// they carry is fixed to the link before them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub held: BTreeMap<String, f64>,
     /// Angles and axes of a serial chain stay as they are written; where absent, one that is a rounded
     /// multiple of 15 degrees (1.5708, 0.785) is taken as that.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -143,7 +143,6 @@ single | [log.joint.q1]\ntorque = "tau1"\n | `log.torque_is` is missing | comman
 single | [log.joint.q2]\n | r.toml:5 | log.joint.q2 | this robot has q1
 single | [log.joint.q1]\nposition_unit = "deg"\n | r.toml:6 | prismatic | "mm"
 cft | [log.joint.q2]\nposition_unit = "mm"\n | r.toml:5 | revolute | "deg"
-cft | [log.joint.q2]\nposition_unit = "counts"\n | r.toml:5 | does not fit
 cft | [log.joint.q2]\ntorque_unit = "N"\n | r.toml:5 | torque_scale
 single | [log.joint.q1]\nposition_sign = 2\n | r.toml:6 | is 2 | 1 or -1
 single | [log.joint.q1]\nposition_scale = 0\n | r.toml:6 | other than 0

@@ -1,6 +1,6 @@
 //! URDF files that cannot be used: each error names file, line and the way out, and none panics.
 
-use cft_ident_files::config::{RobotFile, UrdfChain};
+use cft_ident_files::config::{ChainRequest, RobotFile, UrdfChain};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -155,12 +155,16 @@ fn a_file_that_is_huge_or_no_text_is_refused() {
         .unwrap()
         .set_len(1 << 33)
         .unwrap();
-    let got = UrdfChain::load(&huge, None).unwrap_err().to_string();
+    let got = UrdfChain::load(&huge, &ChainRequest::default())
+        .unwrap_err()
+        .to_string();
     assert!(got.contains("more than 16 MB"), "{got}");
     let binary = folder.path().join("binary.urdf");
     // the mark of UTF-16 and half a letter
     std::fs::write(&binary, [0xff, 0xfe, 0x00]).unwrap();
-    let got = UrdfChain::load(&binary, None).unwrap_err().to_string();
+    let got = UrdfChain::load(&binary, &ChainRequest::default())
+        .unwrap_err()
+        .to_string();
     assert!(got.contains("no element at all"), "{got}");
 }
 

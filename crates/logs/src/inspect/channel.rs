@@ -73,8 +73,8 @@ pub fn is_time(name: &str) -> bool {
 
 /// Names of times.
 const TIMES: &str = "\
-    t time timestamp time_stamp stamp times sec secs seconds elapsed elapsed_time rosbagtimestamp ipoc \
-    zeit clock simtime sim_time rostime header.stamp field.header.stamp";
+    t time timestamp timestamps time_stamp stamp stamps times sec secs seconds elapsed elapsed_time rosbagtimestamp ipoc \
+    zeit clock simtime sim_time rostime datenum header.stamp field.header.stamp";
 
 /// Words that stand for a role where a name begins with one, the longer before the shorter.
 const WORDS: [(ChannelRole, &str); 5] = [
@@ -182,7 +182,15 @@ mod tests {
 
     #[test]
     fn times_are_known_by_their_names() {
-        for name in ["t", "Time", "time [s]", "t_ms", "timestamp(ns)", "time_s"] {
+        for name in [
+            "t",
+            "Time",
+            "time [s]",
+            "t_ms",
+            "timestamp(ns)",
+            "time_s",
+            "timestamps",
+        ] {
             assert!(is_time(name), "{name}");
         }
         for name in ["tau", "tau_1", "temperature", "total", "time_constant"] {

@@ -8,7 +8,8 @@ use serde::Serialize;
 use super::detectors::excitation::JointMotion;
 use super::fault::{FaultKind, LogFault, Severity};
 use super::words::ChannelRole;
-use crate::log::{BridgedSample, EvenSpacing};
+use crate::log::{BridgedSample, EvenSpacing, LogError, TimeUnit};
+use cft_ident_core::number::significant;
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -86,7 +87,7 @@ pub struct LogFindings {
     pub begins_s: f64,
     /// Time from the first to the last row [s].
     pub duration_s: f64,
-    /// One over the median step [Hz]; absent where there is none.
+    /// Rows a second between lost ones [Hz]; absent where there is none.
     pub rate_hz: Option<f64>,
     /// Half the range that the middle 90 % of the steps take, over the median step.
     pub jitter: Option<f64>,
@@ -191,7 +192,49 @@ pub struct ChannelFacts {
     pub limits: Option<[f64; 2]>,
 }
 
+/// Rate that no log of a robot has \[Hz\]: scopes of drives reach half of it. At half it some of those would be
+/// refused; at twice it hours that are taken for seconds pass at 50 Hz.
+const MAX_RATE_HZ: f64 = 1e5;
+/// Fewest rows whose rate is known.
+const MIN_CLOCKED_ROWS: u64 = 16;
+
 impl LogFindings {
+    /// Refuses a clock that no log of a robot has: the times are in another unit than they were read in.
+    ///
+    /// # Errors
+    /// [`LogError::ImpossibleClock`].
+    pub(crate) fn check_clock(&self, log: &str, recording: bool) -> Result<(), LogError> {
+        let rate = self.rows.saturating_sub(1) as f64 / self.duration_s;
+        if self.rows < MIN_CLOCKED_ROWS || !rate.is_finite() || rate <= MAX_RATE_HZ {
+            return Ok(());
+        }
+        let units = [TimeUnit::Minute, TimeUnit::Hour, TimeUnit::Day].map(TimeUnit::in_seconds);
+        let possible = units
+            .iter()
+            .filter(|(_, seconds)| rate / seconds <= MAX_RATE_HZ);
+        let of_unit = |(unit, seconds): &(&str, f64)| {
+            let rate = significant(rate / seconds, 3);
+            format!("`time_unit = \"{unit}\"` makes it {rate} Hz")
+        };
+        let possible: Vec<String> = possible.map(of_unit).collect();
+        let rate_hz = "or `rate_hz = ..` in place of the times, where rows lie evenly";
+        Err(LogError::ImpossibleClock {
+            log: log.to_owned(),
+            rows: self.rows,
+            duration_s: self.duration_s,
+            rate_hz: rate,
+            remedy: match recording {
+                true => format!(
+                    "in [log] of the robot file: the other time of messages, `stamp = \"log\"` or `stamp = \"header\"`; {rate_hz}"
+                ),
+                false => format!(
+                    "in [log] of the robot file: {}; {rate_hz}",
+                    possible.join(", ")
+                ),
+            },
+        })
+    }
+
     /// Brings the faults into their order: the worst first, then by time.
     pub fn sort(&mut self) {
         self.faults.sort_by(|a, b| {

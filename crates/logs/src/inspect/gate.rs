@@ -292,7 +292,9 @@ fn findings(
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         judge.take(&block.t, &columns);
     }
+    judge.clock.seams = reader.seams();
     let mut found = judge.finish();
+    found.check_clock(&escape(&reader.name()), reader.is_recording())?;
     found.count_from(reader.origin().seconds());
     Ok(Some(found))
 }

@@ -15,6 +15,7 @@ use super::detectors::step::{FreshRows, LeapDetector, RowFreshness};
 use super::detectors::turn::TurnDetector;
 use super::detectors::windows::WindowSampler;
 use super::fault::{FaultEpisodes, FaultKind};
+use super::unsigned::WordLeaps;
 use super::words::ChannelRole;
 use crate::log::RowFault;
 
@@ -60,6 +61,7 @@ pub(super) struct ChannelTrack {
     pub(super) leaps: LeapDetector,
     pub(super) turns: TurnDetector,
     pub(super) dips: ZeroDips,
+    pub(super) leaps_of_words: WordLeaps,
     pub(super) excitation: Option<Excitation>,
     /// The channel with the position of the same joint.
     pub(super) position: Option<usize>,
@@ -92,6 +94,7 @@ impl ChannelTrack {
             leaps: LeapDetector::default(),
             turns: TurnDetector::default(),
             dips: ZeroDips::default(),
+            leaps_of_words: WordLeaps::default(),
             excitation: None,
             position,
             latest: f64::NAN,
@@ -188,6 +191,8 @@ impl ChannelTrack {
         self.high = self.high.max(value);
         if self.channel.role == ChannelRole::Torque {
             self.dips.take(value);
+            let counts = (value - self.channel.zero) / self.channel.factor;
+            self.leaps_of_words.take(counts);
         }
         if self.channel.delivers.is_some_and(|most| value.abs() > most) {
             self.undelivered.add(t, t, 1, join);
@@ -249,11 +254,12 @@ impl LogJudge {
             all.filter(|index| channels[*index].role == role).collect()
         };
         let positions = of_role(ChannelRole::Position);
+        let only_torque = of_role(ChannelRole::Torque).len() == 1;
         let position_of = |channel: &InspectedChannel| {
             let joint = channel.joint.as_deref()?;
             let of_joint = |index: &&usize| channels[**index].joint.as_deref() == Some(joint);
-            // A name without a joint means the only one there is.
-            let alone = positions.len() == 1 && joint.is_empty();
+            // A name without a joint means the only one there is, and so does the only torque whatever its name says.
+            let alone = positions.len() == 1 && (joint.is_empty() || only_torque);
             let only = positions.first().filter(|_| alone);
             let found = positions.iter().find(of_joint).or(only).copied();
             found.filter(|_| channel.role != ChannelRole::Position)

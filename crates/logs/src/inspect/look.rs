@@ -4,7 +4,10 @@ use super::channel::InspectedChannel;
 use super::fault::{FaultKind, Severity};
 use super::findings::{LogFindings, RowCost};
 use super::judge::{InspectionDepth, LogJudge};
-use crate::log::{EvenClock, EvenSpacing, LogError, PositionUnwrap, RawBlock, RawReader, RowFault};
+use super::words::ChannelRole;
+use crate::log::{
+    EvenClock, EvenSpacing, LogError, PositionUnwrap, RawBlock, RawReader, RowFault, signed,
+};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +18,8 @@ pub struct ChannelColumn {
     pub factor: f64,
     /// Added after it.
     pub offset: f64,
-    /// Range after which it begins anew [unit of the channel].
+    /// Range after which it begins anew [unit of the channel]: a position goes on through its turns, of a torque the
+    /// number nearest to 0 is taken.
     pub wrap: Option<f64>,
     /// What it is.
     pub channel: InspectedChannel,
@@ -111,8 +115,10 @@ pub fn look(
     judge.keep.clone_from(&plan.keep);
     judge.band_hz = plan.band_hz.unwrap_or(judge.band_hz);
     judge.messages = log.is_recording();
+    let is_torque = |planned: &ChannelColumn| planned.channel.role == ChannelRole::Torque;
     let mut turning: Vec<Option<PositionUnwrap>> = (plan.channels.iter())
-        .map(|planned| planned.wrap.map(PositionUnwrap::new))
+        .map(|planned| planned.wrap.filter(|_| !is_torque(planned)))
+        .map(|wrap| wrap.map(PositionUnwrap::new))
         .collect();
     let mut even = plan.even.map(EvenClock::new);
     let mut fresh = plan.held.map(|rows| FreshRows::new(rows, plan));
@@ -134,6 +140,11 @@ pub fn look(
             if factor != 1.0 || offset != 0.0 {
                 column.iter_mut().for_each(|x| *x = *x * factor + offset);
             }
+            if let Some(range) = planned.wrap.filter(|_| is_torque(planned)) {
+                column
+                    .iter_mut()
+                    .for_each(|x| *x = offset + signed(*x - offset, range));
+            }
             if let Some(turning) = turning {
                 column.iter_mut().for_each(|q| *q = turning.take(*q));
             }
@@ -143,7 +154,9 @@ pub fn look(
             .collect();
         judge.take(&block.t, &columns);
     }
+    judge.clock.seams = log.seams();
     let mut findings = judge.finish();
+    findings.check_clock(&log.log_name(), log.is_recording())?;
     findings.count_from(log.origin().seconds());
     let rows = log.malformed();
     if rows > 0 {

@@ -24,7 +24,7 @@ mod position;
 mod shape;
 pub(crate) mod speeds;
 mod together;
-mod unsigned;
+pub(crate) mod unsigned;
 mod verdicts;
 pub(crate) mod words;
 

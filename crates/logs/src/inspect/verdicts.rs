@@ -49,7 +49,7 @@ fn conclude(judge: &LogJudge) -> LogFindings {
     together::faults(judge, &clock, &mut draft);
     unsigned::faults(judge, &mut draft);
     let costs = costs(&draft, &clock);
-    let rate = (clock.dt > 0.0).then(|| 1.0 / clock.dt);
+    let rate = (clock.mean > 0.0).then(|| 1.0 / clock.mean);
     let gap = |[from, to]: &[f64; 2]| Gap {
         from_s: from - first,
         to_s: to - first,

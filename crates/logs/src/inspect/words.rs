@@ -228,16 +228,18 @@ pub fn role(words: &[NameWord]) -> Option<ChannelRole> {
     // tau_q1 is the torque of q1
     let short = |word: &NameWord| word.text == "q";
     let position = words.iter().any(|w| !short(w) && lists(POSITIONS, &w.text));
-    // a dataset of LeRobot calls positions the observed state
-    let observed = |pair: &[NameWord]| pair[0].text == "observation" && pair[1].text == "state";
-    match (
-        position || words.windows(2).any(observed),
-        has(words, TORQUES),
-    ) {
+    // a dataset of LeRobot says what it observed before the names of its motors, and calls positions the state
+    let observed = words.windows(2).find(|pair| pair[0].text == "observation");
+    let observed = observed.map_or("", |pair| &pair[1].text);
+    let current = has(words, CURRENTS);
+    match (position, has(words, TORQUES)) {
+        _ if lists("effort torque current load", observed) => Some(ChannelRole::Torque),
         (true, _) => Some(ChannelRole::Position),
         (_, true) => Some(ChannelRole::Torque),
-        _ if words.iter().any(short) => Some(ChannelRole::Position),
-        _ if has(words, CURRENTS) => Some(ChannelRole::Torque),
+        _ if words.iter().any(short) || (observed == "state" && !current) => {
+            Some(ChannelRole::Position)
+        }
+        _ if current => Some(ChannelRole::Torque),
         _ => None,
     }
 }

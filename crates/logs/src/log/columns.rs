@@ -3,6 +3,7 @@
 use super::LogError;
 use super::layout::{Channel, Layout, column_number};
 use super::names::{escape, list, nearest};
+use super::section::TimeUnit;
 use super::unit::{self, POSITIONS, TORQUES, UnitKind};
 use cft_ident_core::number::significant;
 
@@ -188,9 +189,8 @@ impl Header<'_> {
 
     /// The same of the time.
     fn check_time(&self, channel: &Channel, name: &str) -> Result<(), LogError> {
-        let units = unit_of(name)
-            .and_then(time_unit)
-            .zip(time_unit(&channel.unit));
+        let stated = |unit: &str| Some(TimeUnit::stated(unit)?.in_seconds().0);
+        let units = unit_of(name).and_then(stated).zip(stated(&channel.unit));
         let Some((found, declared)) = units.filter(|(found, declared)| found != declared) else {
             return Ok(());
         };
@@ -303,25 +303,14 @@ fn suffix_unit(name: &str) -> Option<&str> {
 }
 
 /// Units of quantities that no channel is of.
-const OTHERS: [&str; 15] = [
-    "c", "°c", "degc", "k", "rpm", "hz", "w", "j", "bar", "pa", "min", "h", "date", "m/s^2", "utc",
+const OTHERS: [&str; 13] = [
+    "c", "°c", "degc", "k", "rpm", "hz", "w", "j", "bar", "pa", "date", "m/s^2", "utc",
 ];
 
 pub(super) fn is_unit(text: &str) -> bool {
     let lower = text.to_lowercase();
     let any = || unit::stated(text, &POSITIONS).or_else(|| unit::stated(text, &TORQUES));
-    time_unit(text).is_some() || OTHERS.contains(&&*lower) || any().is_some()
-}
-
-/// One spelling for the units of time that headers state.
-fn time_unit(text: &str) -> Option<&'static str> {
-    Some(match &*text.trim().to_lowercase() {
-        "s" | "sec" | "second" | "seconds" => "s",
-        "ms" | "msec" | "millisecond" | "milliseconds" => "ms",
-        "us" | "µs" | "μs" | "usec" => "us",
-        "ns" | "nsec" => "ns",
-        _ => return None,
-    })
+    TimeUnit::stated(text).is_some() || OTHERS.contains(&&*lower) || any().is_some()
 }
 
 #[cfg(test)]

@@ -269,6 +269,28 @@ pub enum LogError {
         "or give kd = 0, if the controller had no damping"
     )]
     NoVelocities { at: String },
+    /// A clock that no log of a robot has.
+    #[explain(
+        "{log}: {rows} rows in {duration_s:e} s, {rate_hz:.3e} Hz: no recorder is that fast, and the times are in another unit",
+        remedy
+    )]
+    ImpossibleClock {
+        log: String,
+        rows: u64,
+        duration_s: f64,
+        rate_hz: f64,
+        remedy: String,
+    },
+    /// A log that ends before its filter has begun.
+    #[explain(
+        "{log}: lasts {duration_s} s, less than one period of its filter of {cutoff_hz} Hz",
+        "record some seconds of motion; or, where the times are in another unit, say it: `time_unit = ..` in [log] of the robot file"
+    )]
+    ShorterThanFilter {
+        log: String,
+        duration_s: f64,
+        cutoff_hz: f64,
+    },
     /// A line or a quoted field without an end.
     #[explain(
         "{at}: a line or a quoted field is longer than {limit} bytes",

@@ -5,6 +5,11 @@ use std::sync::Arc;
 
 use super::even::EvenSpacing;
 
+/// The number that differs from another one by whole ranges and is nearest to 0.
+pub(crate) fn signed(number: f64, range: f64) -> f64 {
+    number - range * (number / range).round()
+}
+
 /// Follows one position that begins anew after its range, through its turns.
 #[derive(Debug)]
 pub(crate) struct PositionUnwrap {

@@ -67,7 +67,7 @@ pub use columns::unit_of;
 pub use content::unpacked;
 pub(crate) use even::{EvenClock, EvenFit};
 pub use layout::channel;
-pub(crate) use mend::{PositionUnwrap, longest_hold};
+pub(crate) use mend::{PositionUnwrap, longest_hold, signed};
 pub(crate) use messages::{DelayEstimate, DelayEstimator};
 pub use names::{did_you_mean, is_hidden, list};
 pub(crate) use pass::round_within;

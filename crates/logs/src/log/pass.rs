@@ -234,6 +234,15 @@ impl LogPass {
         self.origin.unwrap_or_default()
     }
 
+    /// Times at which runs begin that one table holds, but for the first \[s\]; call it after the last row.
+    pub(super) fn seams(&self) -> Vec<f64> {
+        let mut origin = self.origin;
+        let all = self.rows.seams();
+        all.into_iter()
+            .map(|stamp| stamp.seconds(&mut origin))
+            .collect()
+    }
+
     /// Goes on to the next row; its time [s], NaN where it has none, or `None` at the end.
     #[inline]
     pub(super) fn next(&mut self) -> Result<Option<f64>, LogError> {

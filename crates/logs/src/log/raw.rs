@@ -9,7 +9,9 @@ use super::layout::{Channel, Layout};
 use super::messages::{self, StateGroup, TopicFacts, format_of, state_groups};
 use super::pass::LogPass;
 use super::rows::{RowStrictness, counted};
+use super::section::TimeUnit;
 use super::source::Provenance;
+use super::table;
 use super::time::Instant;
 use super::two_clocks::rest_of;
 use super::{LogError, LogSection, LogSpec};
@@ -120,6 +122,11 @@ impl RawReader {
         Self::open(spec, Some(&layout))
     }
 
+    /// The kind of robot that a dataset of LeRobot says it is of.
+    pub(crate) fn robot_type(&self) -> Option<String> {
+        table::robot_type(self.pass.files.first()?)
+    }
+
     /// Name of the log, for messages.
     pub fn log_name(&self) -> String {
         super::escape(&self.pass.spec.name())
@@ -138,6 +145,18 @@ impl RawReader {
     /// The unit that a column's name states.
     pub fn unit(&self, column: usize) -> Option<&str> {
         self.names().get(column).and_then(|name| unit_of(name))
+    }
+
+    /// Seconds in the unit of time that a column's name states: `time [ms]`, `time_ms`.
+    pub(crate) fn stated_seconds(&self, column: usize) -> Option<f64> {
+        let unit = self.unit(column).and_then(TimeUnit::stated);
+        let unit = unit.or_else(|| TimeUnit::of_suffix(self.names().get(column)?))?;
+        Some(unit.in_seconds().1)
+    }
+
+    /// The same log from its beginning.
+    pub(crate) fn again(&self) -> Result<Self, LogError> {
+        Self::open(&self.pass.spec, Some(self.layout()))
     }
 
     /// Which column a channel of a robot file is.
@@ -294,6 +313,11 @@ impl RawReader {
     /// Fields of a column that hold words, so far.
     pub fn words(&self, column: usize) -> u64 {
         self.words.get(column).copied().unwrap_or(0)
+    }
+
+    /// Times at which runs begin that one table holds, but for the first \[s\]; call it after the last block.
+    pub(crate) fn seams(&self) -> Vec<f64> {
+        self.pass.seams()
     }
 
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::arrays::{ArrayRows, LogArrays};
 use super::even::EvenClock;
 use super::layout::{Channel, Layout};
-use super::mend::{BridgeInserter, HeldRowFilter, MendingSettings, PositionUnwrap, RowRemover};
+use super::mend::{
+    BridgeInserter, HeldRowFilter, MendingSettings, PositionUnwrap, RowRemover, signed,
+};
 use super::pass::LogPass;
 use super::row_store::RowStore;
 use super::rows::{RowStrictness, counted};
@@ -26,6 +28,8 @@ pub struct Reader {
     stale: StaleDetector,
     /// Positions that are followed through their turns, by their places.
     turning: Vec<(usize, PositionUnwrap)>,
+    /// Torques that are read as signed numbers of a range, by their places: range and zero [SI].
+    signed: Vec<(usize, [f64; 2])>,
     held: HeldRowFilter,
     bridging: BridgeInserter,
     failed: RowRemover,
@@ -117,6 +121,7 @@ impl Reader {
             activity: vec![JointActivity::default(); torques.min(joints)],
             stale: StaleDetector::new(joints),
             turning: Vec::new(),
+            signed: Vec::new(),
             held: HeldRowFilter::default(),
             bridging: BridgeInserter::default(),
             failed: RowRemover::default(),
@@ -137,6 +142,9 @@ impl Reader {
             Some((place, PositionUnwrap::new(channel.wrap.or(found)?)))
         };
         self.turning = positions.filter_map(turning).collect();
+        let torques = self.pass.layout.torques.iter().enumerate();
+        let signed = torques.filter_map(|(place, of)| Some((place, [of.wrap?, of.offset])));
+        self.signed = signed.collect();
         self.held = HeldRowFilter::new(mending.held);
         self.even = mending.even.map(EvenClock::new);
         self.bridging = BridgeInserter::new(Arc::clone(&mending.bridges));
@@ -148,6 +156,16 @@ impl Reader {
     /// moves; call it after the last block.
     pub fn hold(&self) -> Option<usize> {
         self.stale.hold()
+    }
+
+    /// Name of the log, without folders.
+    pub(crate) fn name(&self) -> String {
+        self.pass.spec.name()
+    }
+
+    /// Whether rows are messages, with times of their own.
+    pub(crate) fn is_recording(&self) -> bool {
+        self.pass.rows.is_recording()
     }
 
     /// The layout that the log turned out to have.
@@ -268,6 +286,11 @@ impl Reader {
         self.failed.dropped
     }
 
+    /// Times at which runs begin that one table holds, but for the first \[s\]; call it after the last block.
+    pub(crate) fn seams(&self) -> Vec<f64> {
+        self.pass.seams()
+    }
+
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.
     ///
     /// # Errors
@@ -376,6 +399,9 @@ impl Reader {
         let (q, tau) = (&mut block.q[at_q..], &mut block.tau[at_tau..]);
         for (place, unwrap) in &mut self.turning {
             q[*place] = unwrap.take(q[*place]);
+        }
+        for (place, [range, zero]) in &self.signed {
+            tau[*place] = zero + signed(tau[*place] - zero, *range);
         }
         self.bridging.mend(t, q, tau);
         for ((activity, q), tau) in self.activity.iter_mut().zip(&*q).zip(&*tau) {

@@ -60,6 +60,7 @@ pub(crate) struct RowStore {
     begins: Option<f64>,
     clock_remedy: Option<String>,
     warnings: Vec<String>,
+    seams: Vec<RowTime>,
     sha256: OnceLock<String>,
 }
 
@@ -127,6 +128,7 @@ impl RowStore {
             begins: writer.begins,
             clock_remedy: source.clock_remedy(),
             warnings: source.warnings(),
+            seams: source.seams(),
             sha256: sha256.map_or_else(OnceLock::new, OnceLock::from),
         })
     }
@@ -414,6 +416,10 @@ impl LogRows for StoredRows {
 
     fn warnings(&self) -> Vec<String> {
         self.store.warnings.clone()
+    }
+
+    fn seams(&self) -> Vec<RowTime> {
+        self.store.seams.clone()
     }
 
     fn begins(&self) -> Option<f64> {

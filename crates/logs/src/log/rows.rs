@@ -98,6 +98,11 @@ pub(super) trait LogRows: Send {
         Vec::new()
     }
 
+    /// Times at which runs begin that one table holds, but for the first, once the last row is read.
+    fn seams(&self) -> Vec<RowTime> {
+        Vec::new()
+    }
+
     /// SHA-256 of what holds the rows, where that is no file.
     fn sha256(&self) -> Option<&str> {
         None

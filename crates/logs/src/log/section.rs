@@ -40,18 +40,35 @@ pub enum TimeUnit {
     /// Nanosecond.
     #[serde(rename = "ns")]
     Nanosecond,
+    /// Minute.
+    #[serde(rename = "min")]
+    Minute,
+    /// Hour.
+    #[serde(rename = "h")]
+    Hour,
+    /// Day, as MATLAB and spreadsheets count time.
+    #[serde(rename = "d")]
+    Day,
 }
 
 impl TimeUnit {
+    /// The unit that a header states: `ms`, `msec`, `milliseconds`.
+    pub(super) fn stated(text: &str) -> Option<Self> {
+        Some(match &*text.trim().to_lowercase() {
+            "s" | "sec" | "second" | "seconds" => Self::Second,
+            "ms" | "msec" | "millisecond" | "milliseconds" => Self::Millisecond,
+            "us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds" => Self::Microsecond,
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" => Self::Nanosecond,
+            "min" | "minute" | "minutes" => Self::Minute,
+            "h" | "hour" | "hours" => Self::Hour,
+            "d" | "day" | "days" => Self::Day,
+            _ => return None,
+        })
+    }
+
     /// The unit that the name of a column ends with: `time_ms`.
     pub(super) fn of_suffix(name: &str) -> Option<Self> {
-        match name.rsplit_once('_')?.1 {
-            "s" | "sec" => Some(Self::Second),
-            "ms" => Some(Self::Millisecond),
-            "us" => Some(Self::Microsecond),
-            "ns" => Some(Self::Nanosecond),
-            _ => None,
-        }
+        Self::stated(name.rsplit_once('_')?.1)
     }
 
     /// As it is written in files, and seconds in one of it.
@@ -61,6 +78,9 @@ impl TimeUnit {
             Self::Millisecond => ("ms", 1e-3),
             Self::Microsecond => ("us", 1e-6),
             Self::Nanosecond => ("ns", 1e-9),
+            Self::Minute => ("min", 60.0),
+            Self::Hour => ("h", 3600.0),
+            Self::Day => ("d", 86_400.0),
         }
     }
 }
@@ -186,6 +206,10 @@ pub struct JointChannels {
     /// Factor, e.g. torque constant times gear ratio.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_scale: Option<f64>,
+    /// Range after which the logged torque begins anew, in the unit of its column: 65536 for signed numbers of 16 bits
+    /// that are logged as unsigned ones, or with another word above them. The number nearest to 0 is taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_wrap: Option<f64>,
     /// Offset added after scaling [N or Nm].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_offset: Option<f64>,

@@ -51,6 +51,11 @@ impl Instant {
         self.0.unsigned_abs() >= (FAR_S as u128) * SECOND as u128
     }
 
+    /// So many times as far from the zero of the clock.
+    pub(super) fn times(self, times: i128) -> Self {
+        Self(self.0.saturating_mul(times))
+    }
+
     /// The sum with an instant that counts from it.
     pub(super) fn and(self, rest: Self) -> Self {
         Self(self.0.saturating_add(rest.0))

@@ -21,6 +21,8 @@ const USUAL_S: f64 = 2e-3;
 const MAX_STEP_IN_SECONDS_S: f64 = 0.5;
 /// Seconds since 1970 of clocks that are set: 2001 to 2096.
 const EPOCH_S: [f64; 2] = [1e9, 4e9];
+/// Day numbers of the years 2000 to 2100, as a spreadsheet and as MATLAB count them.
+const DAY_NUMBERS: [[f64; 2]; 2] = [[36_526.0, 73_051.0], [730_486.0, 767_011.0]];
 /// Rows from which a unit is reported.
 const MIN_ROWS: usize = 64;
 
@@ -49,6 +51,10 @@ impl TimeUnit {
         let of_epoch = |unit: &Self| within(first * unit.in_seconds().1, EPOCH_S);
         if let Some(unit) = all.iter().find(|unit| possible(unit) && of_epoch(unit)) {
             return *unit;
+        }
+        let is_day = DAY_NUMBERS.iter().any(|years| within(first, *years));
+        if is_day && !possible(&Self::Second) && possible(&Self::Day) {
+            return Self::Day;
         }
         if step <= MAX_STEP_IN_SECONDS_S {
             return Self::Second;
@@ -121,6 +127,10 @@ mod tests {
                 }
             }
         }
+        for (first, rate) in [(739_740.395_8, 100.0), (46_146.4, 1000.0)] {
+            assert_eq!(unit(first, 1.0 / rate / 86_400.0), TimeUnit::Day);
+        }
+        assert_eq!(unit(46_146.4, 2e-3), TimeUnit::Second);
         // a clock that runs since the machine was switched on, 50 minutes ago
         assert_eq!(unit(3e12, 1e6), TimeUnit::Nanosecond);
     }

@@ -7,8 +7,9 @@ use super::column::LogColumn;
 use super::family::{ColumnAssignment, temperatures};
 use super::fitting::{FamilyMatch, best, external, left, offered, without_common_head};
 use super::look::{ClockSource, SeenColumns};
+use super::recorder::CalibratedRobot;
 use super::shown::{UrdfJoint, shown};
-use super::units::{of_positions, of_torques, other_velocity, stated_position};
+use super::units::{in_degrees, of_positions, of_torques, other_velocity, stated_position};
 use crate::inspect::ChannelRole;
 use crate::inspect::words::without_joint;
 use crate::log::{TORQUES, UnitKind, escape, stated_unit};
@@ -35,7 +36,11 @@ pub struct JointColumns {
     #[serde(skip)]
     pub position_scale: Option<f64>,
     #[serde(skip)]
+    pub position_offset: Option<f64>,
+    #[serde(skip)]
     pub wrap: Option<f64>,
+    #[serde(skip)]
+    pub torque_wrap: Option<f64>,
     #[serde(skip)]
     pub torque_unit: Option<&'static str>,
     #[serde(skip)]
@@ -165,7 +170,12 @@ impl Mapping {
             Some(taken) => taken.columns,
             None => vec![None; names.len()],
         });
-        if out.units(&joints, [&beside(&q), &beside(&dq), &beside(&tau)]) {
+        let recorder = seen.robot_type.as_deref().and_then(CalibratedRobot::of);
+        if out.units(
+            &joints,
+            recorder.as_ref(),
+            [&beside(&q), &beside(&dq), &beside(&tau)],
+        ) {
             dq.fill(None);
         }
         let warm = temperatures(columns, &names);
@@ -177,6 +187,7 @@ impl Mapping {
             joint.velocity = dq[k].map(name);
             joint.torque = tau[k].map(name);
             joint.wrap = q[k].and_then(|column| column.wrap);
+            joint.torque_wrap = tau[k].and_then(|column| column.torque_wrap);
             if seen.is_recording() {
                 let other = q[k].and_then(|column| column.name.strip_prefix("q_"));
                 let other = other.filter(|name| *name != joint.joint);
@@ -239,23 +250,36 @@ impl Mapping {
     }
 
     /// Units of positions and torques; whether velocities are in units that do not go with those of the positions.
-    fn units(&mut self, known: &[UrdfJoint], [q, dq, tau]: [&[Option<LogColumn>]; 3]) -> bool {
+    fn units(
+        &mut self,
+        known: &[UrdfJoint],
+        recorder: Option<&CalibratedRobot>,
+        [q, dq, tau]: [&[Option<LogColumn>]; 3],
+    ) -> bool {
         fn paired(columns: &[Option<LogColumn>]) -> (Vec<usize>, Vec<&LogColumn>) {
             let all = columns.iter().enumerate();
             all.filter_map(|(k, column)| Some((k, column.as_ref()?)))
                 .unzip()
         }
         let (found, columns) = paired(q);
-        let kinds: Vec<JointKind> = found.iter().map(|k| known[*k].kind).collect();
-        for (k, unit) in found.iter().zip(of_positions(&columns, &kinds)) {
+        let joints: Vec<&UrdfJoint> = found.iter().map(|k| &known[*k]).collect();
+        let units = match recorder {
+            Some(recorder) => recorder.positions(&columns, &joints),
+            None => of_positions(&columns, &joints),
+        };
+        for (k, unit) in found.iter().zip(units) {
             let joint = &mut self.joints[*k];
             (joint.position_unit, joint.position_scale) = (unit.unit, unit.scale);
+            joint.position_offset = unit.offset;
             self.check(unit.check.map(|text| format!("positions: {text}")));
         }
         let position = |k: &usize| q[*k].as_ref().and_then(stated_position);
         let (with_velocity, velocities) = paired(dq);
         let mut pairs = with_velocity.iter().zip(velocities);
-        let apart = pairs.any(|(k, velocity)| other_velocity(velocity, position(k)));
+        let apart = pairs.any(|(k, velocity)| {
+            let ratio = q[*k].as_ref().and_then(|column| column.per_velocity);
+            other_velocity(velocity, position(k)) || ratio.is_some_and(in_degrees)
+        });
         let (found, columns) = paired(tau);
         let limits: Vec<Option<f64>> = found.iter().map(|k| known[*k].torque).collect();
         let units = of_torques(&columns, &limits);
@@ -286,7 +310,10 @@ impl Mapping {
     fn check_position(&mut self, seen: &SeenColumns, columns: &[Option<LogColumn>]) {
         let unstated = |(joint, column): (&JointColumns, &Option<LogColumn>)| {
             let own = joint.position.as_deref() == Some(&format!("q_{}", joint.joint));
-            let taken = joint.kind == JointKind::Revolute && joint.position_unit.is_none() && !own;
+            let taken = joint.kind == JointKind::Revolute
+                && joint.position_unit.is_none()
+                && joint.position_scale.is_none()
+                && !own;
             let unstated = |column: &LogColumn| stated_position(column).is_none();
             taken && column.as_ref().is_some_and(unstated)
         };
@@ -341,7 +368,9 @@ fn plain(known: &UrdfJoint) -> JointColumns {
         temperature: None,
         position_unit: None,
         position_scale: None,
+        position_offset: None,
         wrap: None,
+        torque_wrap: None,
         torque_unit: None,
         torque_scale: None,
         in_messages: None,

@@ -26,6 +26,10 @@ pub struct LogColumn {
     pub whole: bool,
     /// Range after which it begins anew.
     pub wrap: Option<f64>,
+    /// Range of signed numbers that are logged as unsigned ones.
+    pub torque_wrap: Option<f64>,
+    /// How many times the velocity beside it its derivative is, of a position.
+    pub per_velocity: Option<f64>,
     /// What it holds says its role, and no name.
     pub by_content: bool,
 }

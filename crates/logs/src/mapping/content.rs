@@ -26,6 +26,17 @@ pub(super) fn is_clock(numbers: &[f64]) -> bool {
     !counts && 10 * steps.iter().filter(even).count() >= 9 * steps.len()
 }
 
+/// Whether numbers grow, as the times of rows do.
+pub(super) fn rises(numbers: &[f64]) -> bool {
+    let ends = numbers.first().zip(numbers.last());
+    ends.is_some_and(|(first, last)| first < last) && numbers.is_sorted_by(|a, b| a <= b)
+}
+
+/// Whether numbers count rows, of which some may have been taken out.
+pub(super) fn counts(numbers: &[f64]) -> bool {
+    numbers.iter().all(|x| x.fract() == 0.0) && usual_step(numbers) == 1.0
+}
+
 /// The step of even rows, where their times are rounded to more than a tenth of it: they lie within that of a line.
 pub(super) fn rounded_step(times: &[f64]) -> Option<f64> {
     let (first, last) = (times.first()?, times.last()?);
@@ -94,6 +105,20 @@ pub(super) fn is_rate_of(position: &[f64], other: &[f64], step: f64) -> bool {
     [1.0, 1f64.to_degrees(), 1f64.to_radians()]
         .iter()
         .any(|known| (size / known - 1.0).abs() < SAME_SIZE)
+}
+
+/// How many times a velocity the derivative of a position is, where one follows the other.
+pub(super) fn rate_over(position: &[f64], velocity: &[f64], step: f64) -> Option<f64> {
+    if step <= 0.0 || likeness(position, velocity) < VELOCITY_CORRELATION {
+        return None;
+    }
+    let all = (5..position.len().saturating_sub(5)).map(|k| {
+        let rate = (position[k + 5] - position[k - 5]) / (10.0 * step);
+        [rate * velocity[k], velocity[k] * velocity[k]]
+    });
+    let finite = all.filter(|pair| pair[0].is_finite());
+    let [both, own] = finite.fold([0.0; 2], |sum, pair| [sum[0] + pair[0], sum[1] + pair[1]]);
+    Some(both / own).filter(|ratio| ratio.is_finite())
 }
 
 /// Whether a column is the difference of two others, to a thousandth of its size.

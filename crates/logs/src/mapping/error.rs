@@ -14,7 +14,7 @@ pub enum MappingError {
     /// No column is a time.
     #[explain(
         "{log}: no column is a time: {columns}",
-        "give the rate at which it was recorded: --rate HZ",
+        "give the rate at which it was recorded: `cft-ident new NAME --log LOG --rate HZ` writes a robot file with it, which other commands take with -r",
         "or add a column of times"
     )]
     NoTime {

@@ -2,18 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use super::clock::{ClockColumn, sample};
 use super::column::LogColumn;
 use super::content;
 use super::error::MappingError;
 use super::units::wrap_of;
+use crate::inspect::unsigned::WordLeaps;
 use crate::inspect::words::{is_command, words};
 use crate::inspect::{self, ChannelColumn, ChannelRole, ColumnPlan, InspectedChannel};
 use crate::log::{
-    self, LogSection, LogSpec, Provenance, RawBlock, RawReader, StateGroup, escape, list,
+    self, LogSection, LogSpec, Provenance, RawBlock, RawReader, StateGroup, escape, list, signed,
 };
-
-/// Rows at the beginning whose numbers are looked at one by one.
-const SAMPLE: usize = 20_480;
 
 /// Where times come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +54,8 @@ pub struct SeenColumns {
     /// Rate at which messages lie evenly, whose stamps come in bursts or jitter \[Hz\].
     pub even_hz: Option<f64>,
     pub duration_s: f64,
+    /// The kind of robot that a dataset of LeRobot says it is of.
+    pub robot_type: Option<String>,
     pub name: String,
     pub provenance: Provenance,
 }
@@ -88,15 +89,18 @@ pub fn look(
         ..LogSection::default()
     };
     let mut log = RawReader::open_plain(spec, &section)?;
-    let sample = sample(&mut log)?;
-    let mut log = RawReader::open_plain(spec, &section)?;
     let messages = log.is_recording();
     let time = match messages || asked.rate_hz.is_some() {
         true => None,
-        false => Some(time_of(&mut log, &sample, &name)?),
+        false => Some(ClockColumn::find(&mut log)?),
     };
+    let RawBlock {
+        t: times,
+        columns: sample,
+    } = sample(&mut log)?;
+    let mut log = RawReader::open_plain(spec, &section)?;
     let headerless = log.names().iter().all(|name| name.starts_with('#'));
-    let at = time.as_ref().map(|(at, ..)| *at);
+    let at = time.map(|time| time.place);
     // the time of a recording is its first column
     let at = at.or_else(|| messages.then_some(0));
     let numbers: Vec<usize> = (0..log.names().len()).filter(|k| Some(*k) != at).collect();
@@ -104,6 +108,7 @@ pub fn look(
         unit: log.unit(*k).map(str::to_owned),
         whole: is_whole(&sample[*k]),
         wrap: wrap_of(&sample[*k]),
+        torque_wrap: range_of_words(&sample[*k]),
         path: log.label(*k).map(|_| log.names()[*k].clone()),
         ..LogColumn::named(log.label(*k).unwrap_or(&log.names()[*k]))
     };
@@ -117,15 +122,12 @@ pub fn look(
         }
     }
     if !by_content {
-        let step = time.as_ref().map_or(0.0, |(at, seconds, _)| {
-            seconds * content::usual_step(&sample[*at])
-        });
-        let step = if step > 0.0 {
-            step
-        } else {
-            asked.rate_hz.map_or(0.0, |hz| 1.0 / hz)
+        let step = match asked.rate_hz {
+            Some(hz) => 1.0 / hz,
+            None => content::usual_step(&times),
         };
         no_torques(&mut columns, &numbers, &sample, step);
+        compare_velocities(&mut columns, &numbers, &sample, step);
     }
     let channels = numbers.iter().zip(&columns).map(|(k, column)| {
         let joint = Some(column.joint.as_str());
@@ -138,7 +140,7 @@ pub fn look(
         }
     });
     let plan = ColumnPlan {
-        time: time.as_ref().map(|(at, seconds, _)| (*at, *seconds)),
+        time: time.map(|time| (time.place, time.seconds)),
         channels: channels.collect(),
         ..ColumnPlan::default()
     };
@@ -146,29 +148,34 @@ pub fn look(
     // by name: a log may have ten thousands of columns
     let facts = findings.channels.iter().rev();
     let facts: BTreeMap<_, _> = facts.map(|f| (&f.name, f)).collect();
-    for column in &mut columns {
+    for (column, at) in columns.iter_mut().zip(&numbers) {
         let fact = facts.get(&column.name);
         if let Some((low, high)) = fact.and_then(|f| f.min.zip(f.max)) {
             column.range = [low, high];
         }
+        column.torque_wrap = column
+            .torque_wrap
+            .filter(|_| column.role == ChannelRole::Torque);
+        if let Some(range) = column.torque_wrap {
+            let all = sample[*at].iter().map(|x| signed(*x, range));
+            column.range = all.fold([0.0; 2], |[low, high], x| [x.min(low), x.max(high)]);
+        }
     }
     let even_rate_hz = findings.even_rate_hz.or_else(|| {
-        let (at, seconds, _) = time.as_ref().filter(|_| log.split_clock().is_none())?;
-        let times = &sample[*at];
-        let step = content::rounded_step(times)? * seconds;
-        let rate = 1.0 / step;
+        time.filter(|_| log.split_clock().is_none())?;
+        let rate = 1.0 / content::rounded_step(&times)?;
         Some(log::round_within(rate, rate / times.len() as f64))
     });
     let own_rate = messages.then(|| rate_of_positions(&columns, &numbers, &sample));
     let clock = match (time, even_rate_hz) {
-        (Some((at, ..)), Some(hz)) => ClockSource::Rate {
+        (Some(time), Some(hz)) => ClockSource::Rate {
             hz,
-            coarse: Some(log.names()[at].clone()),
+            coarse: Some(log.names()[time.place].clone()),
         },
-        (Some((at, seconds, guessed)), None) => ClockSource::Column {
-            name: log.names()[at].clone(),
-            seconds,
-            guessed,
+        (Some(time), None) => ClockSource::Column {
+            name: log.names()[time.place].clone(),
+            seconds: time.seconds,
+            guessed: time.guessed,
         },
         (None, _) => match asked.rate_hz {
             Some(hz) if !messages => ClockSource::Rate { hz, coarse: None },
@@ -188,6 +195,7 @@ pub fn look(
         even_hz: findings.even_rate_hz.filter(|_| messages),
         rate_hz: even_rate_hz.or(own_rate.flatten()).or(findings.rate_hz),
         duration_s: findings.duration_s,
+        robot_type: log.robot_type(),
         name,
         provenance: log.provenance()?,
     })
@@ -223,6 +231,29 @@ fn no_torques(columns: &mut [LogColumn], numbers: &[usize], sample: &[Vec<f64>],
     }
     for (torque, role) in found {
         columns[torque].role = role;
+    }
+}
+
+/// Compares the derivative of each measured position with the velocity of its joint.
+fn compare_velocities(
+    columns: &mut [LogColumn],
+    numbers: &[usize],
+    sample: &[Vec<f64>],
+    step: f64,
+) {
+    let is = |column: &LogColumn, role| column.role == role && !column.commanded;
+    for k in 0..columns.len() {
+        let own = &columns[k];
+        let beside = |c: &LogColumn| is(c, ChannelRole::Velocity) && c.joint == own.joint;
+        let mut of_joint = (0..columns.len()).filter(|k| beside(&columns[*k]));
+        if let (true, Some(velocity), None) = (
+            is(own, ChannelRole::Position),
+            of_joint.next(),
+            of_joint.next(),
+        ) {
+            let data = [k, velocity].map(|column| sample[numbers[column]].as_slice());
+            columns[k].per_velocity = content::rate_over(data[0], data[1], step);
+        }
     }
 }
 
@@ -288,52 +319,12 @@ fn chosen(groups: &[StateGroup], name: &str) -> Result<Option<String>, MappingEr
     })
 }
 
-fn sample(log: &mut RawReader) -> Result<Vec<Vec<f64>>, MappingError> {
-    let width = log.names().len();
-    let mut out = vec![Vec::new(); width];
-    let mut block = RawBlock::default();
-    let most = SAMPLE.min((1 << 22) / width.max(1));
-    while out.first().is_some_and(|c| c.len() < most) && log.read(&mut block)? {
-        block.drop_unusable();
-        for (to, from) in out.iter_mut().zip(&block.columns) {
-            to.extend(from);
-        }
-    }
-    Ok(out)
-}
-
-/// Place of the time, seconds per unit of it, and whether it was guessed from its numbers.
-fn time_of(
-    log: &mut RawReader,
-    sample: &[Vec<f64>],
-    name: &str,
-) -> Result<(usize, f64, bool), MappingError> {
-    let named = log.names().iter().position(|name| inspect::is_time(name));
-    let named = named.or(log.split_clock());
-    let runs = |k: &usize| content::is_clock(&sample[*k]);
-    let Some(at) = named.or_else(|| (0..sample.len()).find(runs)) else {
-        return Err(MappingError::NoTime {
-            log: name.to_owned(),
-            columns: list(log.names().iter().map(String::as_str)),
-        });
-    };
-    let of_name = log.unit(at).map(str::to_owned);
-    let suffix = log.names()[at].rsplit_once('_');
-    let suffix = suffix.map(|(_, unit)| unit.to_owned());
-    let stated = [of_name, suffix].into_iter().flatten().find_map(|unit| {
-        Some(match unit.to_lowercase().as_str() {
-            "s" | "sec" => 1.0,
-            "ms" => 1e-3,
-            "us" | "µs" | "μs" => 1e-6,
-            "ns" => 1e-9,
-            _ => return None,
-        })
-    });
-    let seconds = match stated {
-        Some(seconds) => seconds,
-        None => log.set_time_by_numbers(at)?,
-    };
-    Ok((at, seconds, named.is_none()))
+/// The range of signed numbers that are logged as unsigned ones.
+fn range_of_words(numbers: &[f64]) -> Option<f64> {
+    let mut leaps = WordLeaps::default();
+    let finite = numbers.iter().filter(|x| x.is_finite());
+    finite.for_each(|x| leaps.take(*x));
+    leaps.range()
 }
 
 fn is_whole(numbers: &[f64]) -> bool {

@@ -15,6 +15,8 @@ pub struct UrdfJoint {
     pub kind: JointKind,
     /// Its largest torque [N or Nm].
     pub torque: Option<f64>,
+    /// Its least and its greatest position [m or rad].
+    pub position: Option<[f64; 2]>,
 }
 
 /// The joints of the family of positions that has torques beside it and is likeliest measured, else of the largest.
@@ -23,6 +25,7 @@ pub(super) fn shown(columns: &[LogColumn]) -> Vec<UrdfJoint> {
         name: name.to_owned(),
         kind,
         torque: None,
+        position: None,
     };
     let of = |role: ChannelRole| -> Vec<&LogColumn> {
         let of_role = |c: &&LogColumn| c.role == role && !c.commanded;

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::column::LogColumn;
+use super::shown::UrdfJoint;
 use crate::inspect::words::{NamedDrive, drive, lists, words};
 use crate::log::{POSITIONS, TORQUES, UnitKind, escape, is_label, spoken_unit, stated_unit};
 use cft_ident_core::robot::JointKind;
@@ -21,6 +22,8 @@ pub(super) struct Unit {
     pub unit: Option<&'static str>,
     /// `position_scale` or `torque_scale`.
     pub scale: Option<f64>,
+    /// `position_offset`.
+    pub offset: Option<f64>,
     /// The numbers suggest it and no name states it, or it is not enough: what to look at.
     pub check: Option<String>,
     /// It is a current or a voltage, not a torque.
@@ -121,8 +124,37 @@ pub(super) fn other_velocity(velocity: &LogColumn, position: Option<&'static str
     rpm || stated != position.filter(|unit| *unit != "rad" && *unit != "m")
 }
 
+/// Whether a derivative that is so many times its velocity is one of a part of a degree beside the same part of a radian.
+pub(super) fn in_degrees(ratio: f64) -> bool {
+    let power = (ratio.abs() / 1f64.to_degrees()).log10();
+    (power - power.round()).abs() < 0.01
+}
+
+/// The part of a degree that whole numbers count, where the velocities beside them are in the same part of a radian: the
+/// largest one by which every joint stays within its limits.
+fn part_of_degree(columns: &[&LogColumn], joints: &[&UrdfJoint]) -> Option<&'static str> {
+    let by_speed = |column: &&LogColumn| column.per_velocity.is_some_and(in_degrees);
+    let other = |column: &&LogColumn| column.per_velocity.is_some_and(|ratio| !in_degrees(ratio));
+    if !columns.iter().any(by_speed) || columns.iter().any(other) {
+        return None;
+    }
+    let mut limited = columns.iter().zip(joints).filter_map(|(column, joint)| {
+        let [low, high] = joint.position?;
+        Some(column.span() / (high - low))
+    });
+    let first = limited.next()?;
+    let most = limited.fold(first, f64::max);
+    let parts = ["deg", "cdeg", "mdeg"].into_iter();
+    let mut within = parts.filter(|unit| {
+        let size = stated_unit(unit, &POSITIONS).map_or(1.0, |found| found.unit.size);
+        most * size <= 1.0
+    });
+    within.next()
+}
+
 /// The units of the positions of all joints.
-pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<Unit> {
+pub(super) fn of_positions(columns: &[&LogColumn], joints: &[&UrdfJoint]) -> Vec<Unit> {
+    let kinds: Vec<JointKind> = joints.iter().map(|joint| joint.kind).collect();
     let stated = stated_by_all(columns, &|a, b| kinds[a] == kinds[b], &POSITIONS);
     let of = |kind: JointKind| {
         let plain = (0..columns.len()).filter(|k| kinds[*k] == kind && stated[*k].is_none());
@@ -136,7 +168,14 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
     let whole = plain.clone().all(|c| c.whole) && turned.max(slid) > 400.0;
     let first = plain.clone().next().map(|column| &column.name);
     let guessed = |kind: JointKind, column: &LogColumn| {
-        let (unit, check) = match kind {
+        let part = part_of_degree(columns, joints);
+        let (unit, check) = match (kind, part) {
+            (JointKind::Revolute, Some(unit)) if whole => (
+                unit,
+                format!(
+                    "{unit} is taken: whole numbers up to {turned} whose derivative is that of degrees beside velocities in radians, and {unit} is the largest unit in which every joint stays within its limits"
+                ),
+            ),
             _ if whole => (
                 "counts",
                 format!(
@@ -144,13 +183,13 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
                     turned.max(slid)
                 ),
             ),
-            JointKind::Revolute if turned > MAX_POSITION_RAD => (
+            (JointKind::Revolute, _) if turned > MAX_POSITION_RAD => (
                 "deg",
                 format!(
                     "deg is guessed: positions go to {turned:.0}, and no joint turns that far in rad"
                 ),
             ),
-            JointKind::Prismatic if slid > MAX_TRAVEL_M => (
+            (JointKind::Prismatic, _) if slid > MAX_TRAVEL_M => (
                 "mm",
                 format!(
                     "mm is guessed: positions go to {slid:.0}, and no joint slides that far in m"
@@ -165,7 +204,7 @@ pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<U
             ..Unit::of(unit)
         }
     };
-    let each = columns.iter().zip(kinds).zip(&stated);
+    let each = columns.iter().zip(&kinds).zip(&stated);
     let length = |unit: &str| {
         stated_unit(unit, &POSITIONS).is_some_and(|found| found.unit.of == UnitKind::Length)
     };
@@ -225,7 +264,7 @@ pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<
 }
 
 impl Unit {
-    fn of(unit: &'static str) -> Self {
+    pub(super) fn of(unit: &'static str) -> Self {
         Self {
             unit: Some(unit),
             ..Self::default()
@@ -341,6 +380,15 @@ mod tests {
         }
     }
 
+    fn joint(kind: JointKind) -> UrdfJoint {
+        UrdfJoint {
+            name: "a".to_owned(),
+            kind,
+            torque: None,
+            position: Some([-2.6, 2.6]),
+        }
+    }
+
     fn one(all: Vec<Unit>) -> Unit {
         all.into_iter().next().unwrap()
     }
@@ -349,7 +397,10 @@ mod tests {
     fn names_state_units_and_else_sizes_suggest_them() {
         let revolute = JointKind::Revolute;
         let position = |name: &str, largest, whole, kind| {
-            one(of_positions(&[&column(name, largest, whole)], &[kind]))
+            one(of_positions(
+                &[&column(name, largest, whole)],
+                &[&joint(kind)],
+            ))
         };
         let deg = position("act_pos_mot_deg_1", 2.0, false, revolute);
         assert_eq!((deg.unit, deg.check), (Some("deg"), None));
@@ -359,11 +410,17 @@ mod tests {
         let slide = position("q1", 400.5, false, JointKind::Prismatic);
         assert_eq!(slide.unit, Some("mm"));
         let counts = position("q1", 90_000.0, true, revolute);
-        assert_eq!(counts.unit, Some("counts"));
+        assert_eq!((counts.unit, counts.scale), (Some("counts"), None));
+        let by_speed = LogColumn {
+            per_velocity: Some(57.31),
+            ..column("q1", 90_000.0, true)
+        };
+        let found = one(of_positions(&[&by_speed], &[&joint(revolute)]));
+        assert_eq!(found.unit, Some("mdeg"));
         // a word that is a joint's, or a part's
         for names in [["q_base_turn", "q_upper"], ["q_rev_deg", "q_count"]] {
             let both = names.map(|name| column(name, 1.0, false));
-            let found = of_positions(&[&both[0], &both[1]], &[revolute; 2]);
+            let found = of_positions(&[&both[0], &both[1]], &[&joint(revolute); 2]);
             assert_eq!(found, vec![Unit::default(); 2]);
         }
         let torque =

@@ -173,6 +173,11 @@ impl Recording {
         Self { hold, ..self }
     }
 
+    /// Time from its first to its last row [s].
+    pub fn duration_s(&self) -> f64 {
+        self.time_span[1] - self.time_span[0]
+    }
+
     /// Whether torques come from a zero-order hold.
     pub fn is_held(&self) -> bool {
         self.hold.is_some()

@@ -60,6 +60,7 @@ fn known() -> Vec<UrdfJoint> {
         name: name.to_owned(),
         kind: kind(name),
         torque: None,
+        position: None,
     };
     JOINTS.map(one).to_vec()
 }

@@ -155,6 +155,14 @@ pub enum IdentifyError {
         measured: f64,
         unit: &'static str,
     },
+    /// Positions in counts of an unknown size.
+    #[explain(
+        "{robot}: the positions of {joints} are logged in counts, and nothing says what angle or length one is",
+        "give `position_scale` (rad or m per count, the gear between encoder and joint in it) in [log.joint.NAME]: 2 pi / 4096 / gear ratio for an encoder of 4096 a turn",
+        "or the unit that the numbers are in, in place of \"counts\": `position_unit = \"mdeg\"`",
+        "or `position_scale = 1.0`, where they are rad or m"
+    )]
+    WithoutScale { robot: String, joints: String },
     /// Channels of several joints in a unit that is no torque.
     #[explain(
         "{robot}: the torques of {joints} are logged in {unit}, and nothing says what torque that is at each joint: gains differ from joint to joint, and masses and inertias need them",
@@ -252,6 +260,7 @@ impl IdentifyError {
             Self::Reduced(_)
             | Self::Track(_)
             | Self::WithoutGains { .. }
+            | Self::WithoutScale { .. }
             | Self::Log(_)
             | Self::Config(_)
             | Self::Fit(FitError::Math(_))

@@ -103,8 +103,18 @@ impl LogData {
             Log::Arrays(arrays) => Recording::of_arrays(arrays, &request),
             Log::Reduced(part) => Err(without_rows(part)),
         };
+        let read = read?;
+        let (duration_s, cutoff_hz) = (read.duration_s(), setup.settings().cutoff_hz);
+        if duration_s > 0.0 && duration_s * cutoff_hz < 1.0 {
+            return Err(LogError::ShorterThanFilter {
+                log: escape(&log.name()),
+                duration_s,
+                cutoff_hz,
+            }
+            .into());
+        }
         let longest = |dt: f64| setup.settings().longest_step(dt);
-        let mut read = read?.cut_by(&longest);
+        let mut read = read.cut_by(&longest);
         if setup.file.zero_order_hold(read.layout().channels) {
             read = read.held_by(setup.robot.clone());
         }

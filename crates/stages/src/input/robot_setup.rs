@@ -84,11 +84,20 @@ impl RobotSetup {
         }
     }
 
-    /// Whether torques of all joints count in units that gains relate to each other.
+    /// Whether positions are lengths and angles, and torques of all joints count in units that gains relate to each
+    /// other.
     ///
     /// # Errors
-    /// [`IdentifyError::WithoutGains`] for a robot of several joints whose channels are currents, say.
+    /// [`IdentifyError::WithoutScale`] for positions in counts, and [`IdentifyError::WithoutGains`] for a robot of
+    /// several joints whose channels are currents, say.
     pub fn check_gains(&self) -> Result<(), IdentifyError> {
+        let counted = self.file.without_scale();
+        if !counted.is_empty() {
+            return Err(IdentifyError::WithoutScale {
+                robot: escape(&self.name),
+                joints: counted.join(", "),
+            });
+        }
         let found = self.file.without_gains();
         let Some((_, unit)) = found.first().filter(|_| !self.as_declared) else {
             return Ok(());

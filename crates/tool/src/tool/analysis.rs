@@ -479,6 +479,7 @@ impl ResultParts<'_> {
                 WrenchEffect::BiasDrift { degree } => Some(degree),
                 _ => None,
             },
+            begins: self.problem.begins(step.effect),
             deviations: JUDGE.deviations * (f / step.statistic[1]).sqrt(),
             shrinkage,
             size: place.map_or(0.0, |k| self.problem.size(after, k)),

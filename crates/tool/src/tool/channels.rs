@@ -5,6 +5,7 @@ use cft_ident_logs::log::{escape, unit_of};
 
 use super::NUMBERS;
 use super::error::ToolError;
+use super::orientation::{OrientationColumns, families};
 use super::table::WrenchTable;
 use super::units;
 
@@ -15,6 +16,8 @@ pub(super) struct WrenchColumns {
     pub moment: Option<[(usize, f64); 3]>,
     /// As they stand for x y z w by their names, or in their order.
     pub quaternion: Option<[usize; 4]>,
+    /// What an orientation is that is no quaternion.
+    pub orientation: Option<OrientationColumns>,
     pub position: Option<[(usize, f64); 3]>,
     /// Whether names say which is which.
     pub named: bool,
@@ -128,14 +131,104 @@ fn by_names(table: &WrenchTable) -> Result<WrenchColumns, ToolError> {
         [Some(x), Some(y), Some(z), Some(w)] => Some([x, y, z, w]),
         _ => None,
     };
-    Ok(WrenchColumns {
+    let mut out = WrenchColumns {
         force,
         moment,
         quaternion,
         position,
+        orientation: three_named(table).map(OrientationColumns::Three),
         named: true,
         unit_is_stated,
+    };
+    out.complete(table);
+    Ok(out)
+}
+
+/// Names of three numbers that are an orientation: a rotation vector, or angles.
+const TURNS: [[&str; 3]; 5] = [
+    ["rx", "ry", "rz"],
+    ["roll", "pitch", "yaw"],
+    ["a", "b", "c"],
+    ["rotx", "roty", "rotz"],
+    ["alpha", "beta", "gamma"],
+];
+/// Positions beyond this are in millimetres: no arm reaches so far in metres.
+const MOST_M: f64 = 20.0;
+
+/// Three columns with such names, whatever stands before or, in brackets, behind them.
+fn three_named(table: &WrenchTable) -> Option<[usize; 3]> {
+    let last = |name: &String| {
+        let plain = name.split(['[', '(']).next().unwrap_or(name).to_lowercase();
+        let tokens = plain.split(|c: char| !c.is_alphanumeric());
+        let last = tokens.filter(|token| !token.is_empty()).next_back();
+        last.unwrap_or_default().to_owned()
+    };
+    let ends: Vec<String> = table.names.iter().map(last).collect();
+    TURNS.iter().find_map(|names| {
+        let place = |name: &str| ends.iter().position(|end| end == name);
+        let [Some(x), Some(y), Some(z)] = names.map(place) else {
+            return None;
+        };
+        Some([x, y, z])
     })
+}
+
+impl WrenchColumns {
+    /// Adds what numbered columns hold, as interfaces of robots write them: six of a wrench, six of a pose, a matrix of
+    /// nine or sixteen; places in millimetres are told by their size.
+    fn complete(&mut self, table: &WrenchTable) {
+        let mut all = families(&table.names);
+        // what was measured stands before what was wanted
+        let wanted = |head: &str| {
+            ["target", "desired", "_d", "cmd"]
+                .iter()
+                .any(|word| head.contains(word))
+        };
+        all.sort_by_key(|(head, _)| wanted(&head.to_lowercase()));
+        for (head, columns) in &all {
+            let words: Vec<String> = head
+                .split(|c: char| !c.is_alphanumeric())
+                .map(str::to_lowercase)
+                .collect();
+            let says = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+            let plain = |from: usize| std::array::from_fn(|k| (columns[from + k], 1.0));
+            let is_wrench = says(&["force", "wrench", "ft", "f"]);
+            match columns.len() {
+                6 if is_wrench && !self.has_wrench() => {
+                    (self.force, self.moment) = (Some(plain(0)), Some(plain(3)));
+                }
+                6 if says(&["pose", "vector", "cartesian"])
+                    && !is_wrench
+                    && !self.has_orientation() =>
+                {
+                    self.position = Some(plain(0));
+                    let three = std::array::from_fn(|k| columns[3 + k]);
+                    self.orientation = Some(OrientationColumns::Three(three));
+                }
+                count @ (9 | 16) if !self.has_orientation() => {
+                    let width = if count == 9 { 3 } else { 4 };
+                    let nine = std::array::from_fn(|k| columns[width * (k / 3) + k % 3]);
+                    let found = OrientationColumns::Nine(nine);
+                    if found.readings(table).is_some() {
+                        self.orientation = Some(found);
+                    }
+                }
+                _ => {}
+            }
+        }
+        let size = |of: &[(usize, f64); 3]| {
+            let all = of.iter().flat_map(|(column, _)| &table.columns[*column]);
+            all.fold(0.0_f64, |most, x| most.max(x.abs()))
+        };
+        if let Some(of) = self.position.as_mut().filter(|of| size(of) > MOST_M) {
+            of.iter_mut().for_each(|(_, factor)| *factor = 1e-3);
+        }
+    }
+
+    /// Whether orientations are among them.
+    pub fn has_orientation(&self) -> bool {
+        self.quaternion.is_some() || self.orientation.is_some()
+    }
 }
 
 /// Four neighbouring columns that are of length one in all rows, the first ones.

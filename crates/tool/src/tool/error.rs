@@ -38,6 +38,11 @@ pub enum ToolError {
         length: f64,
     },
     #[explain(
+        "{file}: its orientations are not of the kind of those in the logs before it",
+        "give logs of one kind together, the others by themselves"
+    )]
+    Mixed { file: String },
+    #[explain(
         "{file}: row {row}: `{column}` is no number",
         "delete the row, or record it again"
     )]

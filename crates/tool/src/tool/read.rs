@@ -14,7 +14,7 @@ use super::error::ToolError;
 use super::joints::MovingFrame;
 use super::table::WrenchTable;
 use super::units::ForceUnit;
-use super::wrench_log::{WrenchLog, WrenchSample, quaternion_of};
+use super::wrench_log::{OrientationIs, WrenchLog, WrenchSample, quaternion_of};
 
 /// What is asked of files.
 #[derive(Debug, Clone, Default)]
@@ -140,6 +140,8 @@ fn topics(spec: &LogSpec, request: &WrenchRequest) -> Result<Option<[String; 2]>
 /// Orientations of a table, as logged or by the joints of a robot.
 struct PosesOfTable {
     quaternions: Vec<[f64; 4]>,
+    /// Every way to read what is no quaternion; the first are `quaternions`.
+    readings: Vec<(OrientationIs, Vec<[f64; 4]>)>,
     places: Option<Vec<Vector>>,
     named: bool,
 }
@@ -154,8 +156,19 @@ fn poses(
         let quaternion = |(r, _): &(Rotation, Vector)| quaternion_of(r);
         return Ok(Some(PosesOfTable {
             quaternions: along.iter().map(quaternion).collect(),
+            readings: Vec::new(),
             places: Some(along.into_iter().map(|(_, place)| place).collect()),
             named: true,
+        }));
+    }
+    let places = columns.position.map(|of| triples(table, &of)).transpose()?;
+    let readings = columns.orientation.and_then(|of| of.readings(table));
+    if let (None, Some(readings)) = (columns.quaternion, readings) {
+        return Ok(Some(PosesOfTable {
+            quaternions: readings[0].1.clone(),
+            readings,
+            places,
+            named: columns.named,
         }));
     }
     let Some(of) = columns.quaternion else {
@@ -178,9 +191,9 @@ fn poses(
         }
         quaternions.push(four.map(|x| x / length));
     }
-    let places = columns.position.map(|of| triples(table, &of)).transpose()?;
     Ok(Some(PosesOfTable {
         quaternions,
+        readings: Vec::new(),
         places,
         named: columns.named,
     }))
@@ -246,7 +259,7 @@ pub fn read_wrenches(request: &WrenchRequest) -> Result<(WrenchLog, Vec<Provenan
                     request,
                 )?;
             }
-            None if columns.has_wrench() && (columns.quaternion.is_some() || frame.is_some()) => {
+            None if columns.has_wrench() && (columns.has_orientation() || frame.is_some()) => {
                 let both = (&pose, &columns);
                 joined(&mut out, both, both, frame.as_ref(), request)?;
             }
@@ -270,8 +283,7 @@ pub fn read_wrenches(request: &WrenchRequest) -> Result<(WrenchLog, Vec<Provenan
 
 /// What a table lacks.
 fn incomplete(table: &WrenchTable, of: &WrenchColumns) -> ToolError {
-    const QUATERNION: &str =
-        "name them qx, qy, qz, qw, or give joint angles with --urdf ARM.urdf --frame tool0";
+    const QUATERNION: &str = "name them qx, qy, qz, qw, or rx, ry, rz (a rotation vector), or roll, pitch, yaw, or A, B, C, or R[0] .. R[8]; or give joint angles with --urdf ARM.urdf --frame tool0";
     let (missing, remedy) = match of.has_wrench() {
         true => ("an orientation", QUATERNION),
         false => (
@@ -334,6 +346,11 @@ fn joined(
     // logs follow each other
     let after = out.samples.last().map_or(0.0, |last| last.t + 1.0);
     let before = out.samples.len();
+    let mut readings: Vec<(OrientationIs, Vec<[f64; 4]>)> = poses
+        .readings
+        .iter()
+        .map(|(is, _)| (*is, Vec::new()))
+        .collect();
     match clocks {
         Some((of_pose, of_wrench))
             if pose.rows() != wrench.rows() || of_pose != of_wrench || later != 0.0 =>
@@ -350,6 +367,9 @@ fn joined(
                     continue;
                 }
                 let ends = [k, (k + 1).min(poses.quaternions.len() - 1)];
+                for (reading, (_, all)) in readings.iter_mut().zip(&poses.readings) {
+                    reading.1.push(midway(ends.map(|k| all[k]), part));
+                }
                 let position = poses.places.as_ref().map(|places| {
                     let [a, b] = ends.map(|k| places[k]);
                     std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
@@ -397,8 +417,13 @@ fn joined(
                 moment: moments[row],
             });
             out.samples.extend(samples);
+            readings.clone_from(&poses.readings);
         }
     }
+    out.add_readings(readings, before)
+        .map_err(|()| ToolError::Mixed {
+            file: pose.file.clone(),
+        })?;
     if before > 0 {
         let first = out.samples[before].t;
         out.samples[before..]

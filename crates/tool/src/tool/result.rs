@@ -65,6 +65,8 @@ pub struct ToolStep {
     /// Errors on neighbours left out.
     pub before: ForceMoment,
     pub after: ForceMoment,
+    /// When it begins, of a change at an instant: time \[s\], or number of the row from 0.
+    pub begins: Option<f64>,
     /// Its size: the change of the bias \[N\], the angle \[rad\], the largest gain error, the stiffness \[N/m\].
     pub size: f64,
 }

@@ -8,6 +8,7 @@ use super::effect::{DEGREES, WrenchEffect};
 use super::equations::LinearisedAt;
 use super::fit::{WrenchFit, WrenchProblem, blocks, held_out_blocks, mean_norms};
 use super::physics::{BaseColumns, felt};
+use super::taring::with_tarings;
 use super::wrench_log::turn_of;
 use cft_ident_core::judge::{hotelling, hotelling_floor};
 use cft_ident_core::robot::tree::space::UNTURNED;
@@ -119,11 +120,15 @@ fn candidates(problem: &WrenchProblem, chosen: &[WrenchEffect]) -> Vec<Vec<Wrenc
     if spread(problem) > NUMBERS.cable_m {
         single.push(WrenchEffect::Cable);
     }
-    single.extend(taring(problem, chosen));
     for effect in single {
         if !has(effect.name()) {
             out.push([chosen, &[effect]].concat());
         }
+    }
+    // steps of the bias stand beside a drift, or in its place
+    out.extend(with_tarings(problem, chosen));
+    if rest.len() < chosen.len() {
+        out.extend(with_tarings(problem, &rest));
     }
     let base = problem.base.len();
     let fits = |set: &Vec<WrenchEffect>| {
@@ -141,43 +146,6 @@ fn spread(problem: &WrenchProblem) -> f64 {
             .map_or(0.0, |away| away.iter().map(|x| x * x).sum())
     });
     (squares.sum::<f64>() / problem.rows.len().max(1) as f64).sqrt()
-}
-
-/// Rows on each side of a change of the bias, at least.
-const BESIDE: usize = 3;
-
-/// The row from which what is left differs most from what is left before.
-fn taring(problem: &WrenchProblem, chosen: &[WrenchEffect]) -> Option<WrenchEffect> {
-    let n = problem.rows.len();
-    let residual = fitted(problem, chosen, &held_out_blocks(n)).residual;
-    let [wf, wt] = problem.weights;
-    let mut before = [0.0; 6];
-    let mut all = [0.0; 6];
-    residual
-        .iter()
-        .for_each(|e| (0..6).for_each(|k| all[k] += e[k]));
-    let mut best = (0.0, None);
-    for row in 1..n {
-        (0..6).for_each(|k| before[k] += residual[row - 1][k]);
-        if row < BESIDE || row + BESIDE > n {
-            continue;
-        }
-        let (a, b) = (row as f64, (n - row) as f64);
-        let apart: f64 = (0..6)
-            .map(|k| {
-                let w = if k < 3 { wf } else { wt };
-                (w * (before[k] / a - (all[k] - before[k]) / b)).powi(2)
-            })
-            .sum();
-        let score = apart * a * b / (a + b);
-        if score > best.0 {
-            best = (score, Some(row));
-        }
-    }
-    let row = best.1?;
-    Some(WrenchEffect::Taring {
-        row: problem.rows[row].number,
-    })
 }
 
 /// Sum of what one fit takes off another's squared errors by block, and its standard error.
@@ -232,31 +200,29 @@ pub(super) fn search(problem: &WrenchProblem) -> FoundEffects {
         let Some((gained, after, fit)) = best else {
             break;
         };
-        let effect = fit.effects.last().copied();
-        let Some(effect) = effect else { break };
-        let step = JudgedEffect {
-            effect,
-            before: mean_norms(&now.held_out),
-            after: mean_norms(&fit.held_out),
-            gain: gained,
-            statistic: [0.0, f64::INFINITY],
-            written: false,
+        // a drift of another degree, or steps at other places, began where those before them did
+        let begun = |name: &str| {
+            steps
+                .iter()
+                .find(|step| step.effect.name() == name)
+                .cloned()
         };
-        // another degree of the same drift begins where that one began
-        let same = steps
-            .iter()
-            .position(|s: &JudgedEffect| s.effect.name() == effect.name());
-        match same {
-            Some(k) => {
-                steps[k].effect = effect;
-                steps[k].after = step.after;
-                steps[k].gain = [
-                    steps[k].gain[0] + gained[0],
-                    steps[k].gain[1].hypot(gained[1]),
-                ];
-            }
-            None => steps.push(step),
-        }
+        let stands = |effect: &WrenchEffect| {
+            let own = steps.iter().find(|step| step.effect == *effect).cloned();
+            own.unwrap_or_else(|| {
+                let before = begun(effect.name());
+                let [sum, se] = before.as_ref().map_or([0.0; 2], |step| step.gain);
+                JudgedEffect {
+                    effect: *effect,
+                    before: before.map_or(mean_norms(&now.held_out), |step| step.before),
+                    after: mean_norms(&fit.held_out),
+                    gain: [sum + gained[0], se.hypot(gained[1])],
+                    statistic: [0.0, f64::INFINITY],
+                    written: false,
+                }
+            })
+        };
+        steps = fit.effects.iter().map(stands).collect();
         (chosen, squares, now) = (fit.effects.clone(), after, fit);
     }
     let fit = settled(problem, &mut steps);

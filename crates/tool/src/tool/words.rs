@@ -38,8 +38,13 @@ pub fn step_in_words(step: &ToolStep, has_clock: bool) -> String {
             step.degree.unwrap_or_default()
         ),
         "taring" => format!(
-            "the bias changes at once by {}: the sensor was tared, or struck",
-            newton(size)
+            "the bias changes at once by {}{}: the sensor was tared, or struck",
+            newton(size),
+            match (step.begins, has_clock) {
+                (Some(t), true) => format!(" at {} s", number::significant(t, 5)),
+                (Some(row), false) => format!(" from row {} on", row + 1.0),
+                (None, _) => String::new(),
+            }
         ),
         "leaning-base" => format!("the base leans by {}", degrees()),
         "turned-sensor" => format!(

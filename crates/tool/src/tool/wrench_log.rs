@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct WrenchSample {
     /// Time \[s\], or number of the row where there is no clock.
     pub t: f64,
-    /// Quaternion as it was logged, of length one.
+    /// Quaternion as it was logged, of length one; of another orientation as the first of [`WrenchLog::orientations`]
+    /// has it.
     pub quaternion: [f64; 4],
     /// Origin of the sensor in the base frame \[m\].
     pub position: Option<Vector>,
@@ -27,6 +28,8 @@ pub struct WrenchLog {
     pub has_clock: bool,
     /// Whether names or the robot say what the quaternion's numbers are: x y z w of the sensor in the base.
     pub orientation_is_named: bool,
+    /// Every way to read orientations that are no quaternions: x y z w of the sensor in the base, one for each sample.
+    pub orientations: Vec<(OrientationIs, Vec<[f64; 4]>)>,
     /// Whether a unit of the forces is stated.
     pub unit_is_stated: bool,
     /// What was chosen on the way, one sentence each.
@@ -64,14 +67,48 @@ pub enum OrientationIs {
     InverseXyzw,
     /// w x y z of that.
     InverseWxyz,
+    /// A vector along the axis, as long as the angle.
+    RotationVector,
+    /// The same of the base in the sensor's frame.
+    InverseRotationVector,
+    /// Angles about the fixed axes x, y, z, one after the other.
+    RollPitchYaw,
+    /// Angles about z, then y, then x as they were turned: A B C.
+    AboutZyx,
+    /// Angles about x, then y, then z as they were turned.
+    AboutXyz,
+    /// Angles about z, then y, then z as they were turned.
+    AboutZyz,
+    /// A matrix, column after column.
+    MatrixByColumns,
+    /// A matrix, row after row.
+    MatrixByRows,
 }
 
 impl OrientationIs {
     /// The ways that are asked for, those as named first.
     pub const ALL: [Self; 4] = [Self::Xyzw, Self::Wxyz, Self::InverseXyzw, Self::InverseWxyz];
 
+    /// What three numbers may be, the likeliest first.
+    pub(super) const OF_THREE: [Self; 6] = [
+        Self::RotationVector,
+        Self::RollPitchYaw,
+        Self::AboutZyx,
+        Self::AboutXyz,
+        Self::AboutZyz,
+        Self::InverseRotationVector,
+    ];
+
     pub fn words(self) -> &'static str {
         match self {
+            Self::RotationVector => "a rotation vector of the sensor in the base frame",
+            Self::InverseRotationVector => "a rotation vector of the base in the sensor's frame",
+            Self::RollPitchYaw => "roll, pitch and yaw about fixed x, y, z",
+            Self::AboutZyx => "angles about z, y', x'' (A B C)",
+            Self::AboutXyz => "angles about x, y', z''",
+            Self::AboutZyz => "angles about z, y', z''",
+            Self::MatrixByColumns => "a matrix by columns",
+            Self::MatrixByRows => "a matrix by rows",
             Self::Xyzw => "x y z w of the sensor in the base frame",
             Self::Wxyz => "w x y z of the sensor in the base frame",
             Self::InverseXyzw => "x y z w of the base in the sensor's frame",
@@ -83,12 +120,12 @@ impl OrientationIs {
     fn rotation(self, numbers: &[f64; 4]) -> Rotation {
         let [a, b, c, d] = *numbers;
         let rotation = of_quaternion(match self {
-            Self::Xyzw | Self::InverseXyzw => [a, b, c, d],
             Self::Wxyz | Self::InverseWxyz => [b, c, d, a],
+            _ => [a, b, c, d],
         });
         match self {
-            Self::Xyzw | Self::Wxyz => rotation,
             Self::InverseXyzw | Self::InverseWxyz => transposed(&rotation),
+            _ => rotation,
         }
     }
 }
@@ -102,10 +139,37 @@ pub struct WrenchReading {
     pub orientation: OrientationIs,
 }
 
+impl WrenchLog {
+    /// Appends the readings of one more log, of which `before` samples stood before; an error where they are of other
+    /// kinds than those before them.
+    pub(super) fn add_readings(
+        &mut self,
+        readings: Vec<(OrientationIs, Vec<[f64; 4]>)>,
+        before: usize,
+    ) -> Result<(), ()> {
+        if before == 0 {
+            self.orientations = readings;
+            return Ok(());
+        }
+        let kinds = |all: &[(OrientationIs, Vec<[f64; 4]>)]| -> Vec<OrientationIs> {
+            all.iter().map(|(is, _)| *is).collect()
+        };
+        if kinds(&self.orientations) != kinds(&readings) {
+            return Err(());
+        }
+        for ((_, all), (_, more)) in self.orientations.iter_mut().zip(readings) {
+            all.extend(more);
+        }
+        Ok(())
+    }
+}
+
 impl WrenchReading {
     /// The ways that a log may be meant.
     pub fn of(log: &WrenchLog) -> Vec<Self> {
+        let others: Vec<OrientationIs> = log.orientations.iter().map(|(is, _)| *is).collect();
         let orientations = match log.orientation_is_named {
+            _ if !others.is_empty() => &others,
             true => &OrientationIs::ALL[..1],
             false => &OrientationIs::ALL[..],
         };
@@ -124,8 +188,13 @@ impl WrenchReading {
         let places: Vec<Vector> = log.samples.iter().filter_map(|s| s.position).collect();
         let middle = |k: usize| places.iter().map(|x| x[k]).sum::<f64>() / places.len() as f64;
         let middle: Vector = std::array::from_fn(middle);
+        let own = log
+            .orientations
+            .iter()
+            .find(|(is, _)| *is == self.orientation);
         let of = |(number, sample): (usize, &WrenchSample)| {
-            let rotation = self.orientation.rotation(&sample.quaternion);
+            let logged = own.map_or(&sample.quaternion, |(_, all)| &all[number]);
+            let rotation = self.orientation.rotation(logged);
             let own = |x: &Vector| match self.frame {
                 WrenchFrame::Sensor => *x,
                 WrenchFrame::Base => turned_back(&rotation, x),

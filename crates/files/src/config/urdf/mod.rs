@@ -7,6 +7,7 @@
 
 pub(super) mod beside;
 pub mod capsules;
+mod held;
 mod link;
 pub mod mesh;
 pub(super) mod mjcf;
@@ -17,6 +18,7 @@ pub(super) mod source;
 mod tree;
 mod xml;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::ConfigError;
@@ -57,10 +59,32 @@ struct CollisionShape {
     shape: Option<LinkShape>,
 }
 
+/// What is asked of a URDF.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ChainRequest<'a> {
+    /// Link where the chain ends; every branch is read where absent.
+    pub tip: Option<&'a str>,
+    /// Joints that stand still, and where [m or rad].
+    pub held: Option<&'a BTreeMap<String, f64>>,
+    angles: AngleConvention,
+}
+
+impl<'a> ChainRequest<'a> {
+    /// A chain up to `tip`, joints of it held.
+    pub fn new(tip: Option<&'a str>, held: &'a BTreeMap<String, f64>) -> Self {
+        Self {
+            tip,
+            held: Some(held),
+            ..Self::default()
+        }
+    }
+}
+
 /// How angles and axes are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum AngleConvention {
     /// 1.5708 as pi/2.
+    #[default]
     Meant,
     Written,
 }
@@ -106,31 +130,32 @@ impl UrdfChain {
     /// [`ConfigError::Syntax`] where it is no well-formed XML, [`ConfigError::Value`] with the line
     /// of the link or joint that cannot be used.
     pub fn parse(file: &str, text: &str, tip: Option<&str>) -> Result<Self, ConfigError> {
-        Self::parse_with(file, text, tip, AngleConvention::Meant)
+        let asked = ChainRequest {
+            tip,
+            ..ChainRequest::default()
+        };
+        Self::parse_with(file, text, &asked)
     }
 
-    fn parse_with(
-        file: &str,
-        text: &str,
-        tip: Option<&str>,
-        angles: AngleConvention,
-    ) -> Result<Self, ConfigError> {
+    fn parse_with(file: &str, text: &str, asked: &ChainRequest) -> Result<Self, ConfigError> {
         let text = xml::without_comments(text);
         let tree = xml::Tree::parse(&text).map_err(|wrong| no_xml(file, wrong))?;
-        let place = UrdfPlace { file, angles };
-        tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)
+        let place = UrdfPlace {
+            file,
+            angles: asked.angles,
+        };
+        let mut parts = parts::parts(tree.root(), &place)?;
+        if let Some(held) = asked.held {
+            parts.hold(held, &place)?;
+        }
+        tree::chain(&parts, asked.tip, &place)
     }
 
     /// Reads a URDF file.
-    pub fn load(path: &Path, tip: Option<&str>) -> Result<Self, ConfigError> {
-        Self::load_with(path, tip, AngleConvention::Meant)
-    }
-
-    fn load_with(
-        path: &Path,
-        tip: Option<&str>,
-        angles: AngleConvention,
-    ) -> Result<Self, ConfigError> {
+    ///
+    /// # Errors
+    /// A file that cannot be read, and those of [`Self::parse`].
+    pub fn load(path: &Path, asked: &ChainRequest) -> Result<Self, ConfigError> {
         let file = shown(path);
         let text = text_of(path).map_err(|source| ConfigError::Read {
             file: file.clone(),
@@ -146,7 +171,7 @@ impl UrdfChain {
             },
             source,
         })?;
-        Self::parse_with(&file, &text, tip, angles)
+        Self::parse_with(&file, &text, asked)
     }
 }
 
@@ -163,9 +188,15 @@ pub(super) fn resolve(
     }
     let Some(urdf) = &robot.urdf else {
         let remedy = "delete it, or name the URDF file";
-        return match robot.tip {
+        let alone = [
+            ("tip", robot.tip.is_some()),
+            ("held", !robot.held.is_empty()),
+        ];
+        return match alone.iter().find(|(_, there)| *there) {
             None => Ok(()),
-            Some(_) => Err(document.value(&["robot", "tip"], "stands without a `urdf`", remedy)),
+            Some((key, _)) => {
+                Err(document.value(&["robot", key], "stands without a `urdf`", remedy))
+            }
         };
     };
     if !robot.link.is_empty() {
@@ -183,12 +214,18 @@ pub(super) fn resolve(
         Some(true) => AngleConvention::Written,
         _ => AngleConvention::Meant,
     };
-    let chain = UrdfChain::load_with(&folder.join(urdf), robot.tip.as_deref(), angles)?;
+    let asked = ChainRequest {
+        tip: robot.tip.as_deref(),
+        held: Some(&robot.held),
+        angles,
+    };
+    let chain = UrdfChain::load(&folder.join(urdf), &asked)?;
     file.notes.0.extend(chain.notes);
     robot.link = chain.links;
     robot.frame.splice(0..0, chain.frames);
     robot.urdf = None;
     robot.tip = None;
+    robot.held.clear();
     for (joint, found) in chain.limits {
         // what the robot file says stands
         let said = file.limits.entry(joint).or_default();

@@ -46,12 +46,16 @@ pub(crate) struct LogClock {
     pub(crate) repeated: FaultEpisodes,
     pub(crate) backward: FaultEpisodes,
     pub(crate) without_time: u64,
+    /// Times at which runs begin that one table holds: no row is lost before them [s].
+    pub(crate) seams: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct ClockFacts {
-    /// Median step [s]; 0 where there is none.
+    /// Median step [s], to about a percent; 0 where there is none.
     pub(crate) dt: f64,
+    /// Mean of the steps that are neither lost rows nor repeats [s]: jitter puts the median off, and leaves the mean.
+    pub(crate) mean: f64,
     /// Half the range that the middle 90 % of the steps take, over the median.
     pub(crate) jitter: f64,
     /// Share of the steps that are off the median by more than a tenth, gaps aside.
@@ -133,11 +137,23 @@ impl LogClock {
         if dt <= 0.0 {
             return ClockFacts::default();
         }
-        let gaps = self.long.iter().filter(|[a, b]| b - a > GAP * dt);
+        let seam = |t: f64| self.seams.iter().any(|seam| (t - seam).abs() < 0.5 * dt);
+        let gaps = self
+            .long
+            .iter()
+            .filter(|[a, b]| b - a > GAP * dt && !seam(*b));
         let (low, high) = (self.steps.quantile(0.05), self.steps.quantile(0.95));
         let even = |side: f64| (1.0 + side * EVEN_STEP_TOLERANCE) * dt;
+        let mut mean = dt;
+        for _ in 0..MEAN_ROUNDS {
+            mean = self
+                .steps
+                .mean_within(0.25 * mean, 1.75 * mean)
+                .unwrap_or(mean);
+        }
         ClockFacts {
             dt,
+            mean,
             jitter: 0.5 * (high - low) / dt,
             uneven: (self.steps).share_outside(even(-1.0), even(1.0)),
             gaps: gaps.copied().collect(),

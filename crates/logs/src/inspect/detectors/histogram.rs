@@ -64,6 +64,19 @@ impl Histogram {
         (outside + if low > 0.0 { self.zeros } else { 0 }) as f64 / self.total as f64
     }
 
+    /// Mean of those counted between two magnitudes, to the width of a bin at both ends.
+    pub(crate) fn mean_within(&self, low: f64, high: f64) -> Option<f64> {
+        let bins = self.counts.iter().zip(&self.sums);
+        let within = bins.filter(|(count, sum)| {
+            let mean = *sum / (**count).max(1) as f64;
+            mean >= low && mean <= high
+        });
+        let [count, sum] = within.fold([0.0; 2], |[n, total], (count, sum)| {
+            [n + *count as f64, total + sum]
+        });
+        (count > 0.0).then(|| sum / count)
+    }
+
     fn at(&self, mut below: u64, total: u64, share: f64) -> f64 {
         let wanted = ((share * total as f64).ceil() as u64).clamp(1, total.max(1));
         if below >= wanted || total == 0 {

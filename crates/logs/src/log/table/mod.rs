@@ -21,6 +21,9 @@ use super::open_file::OpenFile;
 use super::source::{file_name, shown};
 pub(super) use lines::TableText;
 
+/// Largest description of a dataset [bytes].
+const DESCRIPTION: u64 = 1 << 24;
+
 /// A file that is opened: its path, its bytes, and the files that go on with it.
 type TableOpening<'o> = (&'o Path, &'o OpenFile, &'o [PathBuf]);
 
@@ -89,6 +92,19 @@ pub(super) fn open(
     let open = format.map(|format| (format.open)((path, file, more)));
     open.unwrap_or_else(|| Err(io::ErrorKind::Unsupported.into()))
         .map_err(refuse)
+}
+
+/// The description of the dataset of LeRobot that a file belongs to.
+fn described(path: &Path) -> Option<serde_json::Value> {
+    let place = path.ancestors().nth(3)?.join("meta").join("info.json");
+    let small = std::fs::metadata(&place).is_ok_and(|about| about.len() <= DESCRIPTION);
+    let text = small.then(|| std::fs::read_to_string(&place).ok());
+    serde_json::from_str(&text??).ok()
+}
+
+/// The kind of robot that a dataset of LeRobot says it is of.
+pub(super) fn robot_type(path: &Path) -> Option<String> {
+    Some(described(path)?["robot_type"].as_str()?.to_owned())
 }
 
 /// The Parquet files of a dataset of LeRobot, in their order; `None` for any other folder.

@@ -15,16 +15,15 @@ use parquet::record::reader::RowIter;
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 
+use super::described;
 use super::lines::{COLUMNS, Table, TableText, damaged, number, unusable};
 
-/// Time between the last row of an episode and the first of the next [s]: longer than any filter reaches.
-const BETWEEN_EPISODES_S: f64 = 10.0;
-/// Largest description of a dataset [bytes].
-const DESCRIPTION: u64 = 1 << 24;
-
-/// A column of the file, and how many numbers a row of it has.
+/// A column of the file.
 struct Column {
     name: String,
+    /// What the first row that is whole has in it: a row of it has as many numbers, and where it has none, none.
+    like: Field,
+    /// How many numbers that are.
     width: usize,
 }
 
@@ -32,50 +31,47 @@ struct ParquetTable {
     columns: Vec<Column>,
     rows: RowIter<'static>,
     waiting: VecDeque<PathBuf>,
-    /// The first row, read for its widths.
-    first: Option<Row>,
     number: u64,
     clock: Option<EpisodeClock>,
 }
 
-/// Times of the frames of a dataset, episode after episode.
+/// Times of the frames of a dataset, from the beginning of each episode.
 struct EpisodeClock {
     fps: f64,
-    /// Places of `frame_index` and `episode_index` among the columns.
+    /// Place of `frame_index` among the columns.
     frame: usize,
-    episode: usize,
-    before: Option<(i64, f64)>,
-    begins: f64,
 }
 
 pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
     let mut notes = Vec::new();
-    let (mut rows, nanoseconds) = whole(|| rows_of(path, &mut notes))?;
-    let first = whole(|| rows.next().transpose().map_err(broken))?;
+    let (rows, nanoseconds) = whole(|| rows_of(path, &mut notes))?;
+    let fields = whole_fields(path)?;
     let described = described(path);
     let mut columns = Vec::new();
     let mut names = Vec::new();
-    let fields = first.iter().flat_map(Row::get_column_iter);
-    for ((name, field), nanoseconds) in fields.zip(nanoseconds) {
+    for ((name, like), nanoseconds) in fields.into_iter().zip(nanoseconds) {
         let mut own = Vec::new();
         match nanoseconds {
             true => own.push(" [ns]".to_owned()),
-            false => leaves(field, String::new(), &mut own),
+            false => leaves(&like, String::new(), &mut own),
         }
-        columns.push(Column {
-            name: name.clone(),
-            width: own.len(),
-        });
-        let listed = described.as_ref().and_then(|all| list_of(all, name));
+        let listed = described.as_ref().and_then(|all| list_of(all, &name));
         let listed = listed.filter(|listed| listed.len() == own.len() && own.len() > 1);
         match listed {
             Some(listed) => names.extend(listed.iter().map(|of| format!("{name}.{of}"))),
             None => {
-                // the index of pandas where it has no name of its own
-                let name = if is_index(name) { "time" } else { name };
+                // instants in the index of pandas, where it has no name of its own
+                let dated =
+                    name.starts_with("__index_level_") && own.iter().all(|of| of.ends_with(']'));
+                let name = if dated { "time" } else { &name };
                 names.extend(own.iter().map(|of| format!("{name}{of}")));
             }
         }
+        columns.push(Column {
+            name,
+            like,
+            width: own.len(),
+        });
         if names.len() > COLUMNS {
             return Err(unusable(format!("more than {COLUMNS} columns")));
         }
@@ -85,15 +81,12 @@ pub(super) fn open(path: &Path, more: &[PathBuf]) -> io::Result<TableText> {
         .and_then(|all| EpisodeClock::of(all, &columns));
     if clock.is_some() {
         names.insert(0, "time [s]".to_owned());
-        notes.push(format!(
-            "times are frame_index over fps, and episodes follow one another {BETWEEN_EPISODES_S} s apart"
-        ));
+        notes.push("times are frame_index over fps".to_owned());
     }
     let table = ParquetTable {
         columns,
         rows,
         waiting: more.iter().cloned().collect(),
-        first,
         number: 0,
         clock,
     };
@@ -115,8 +108,7 @@ fn rows_of(path: &Path, notes: &mut Vec<String>) -> io::Result<(RowIter<'static>
     let reader = SerializedFileReader::new(File::open(path)?).map_err(broken)?;
     let about = reader.metadata().file_metadata();
     let root = about.schema_descr().root_schema();
-    let (kept, left): (Vec<_>, Vec<_>) = (root.get_fields().iter().cloned())
-        .partition(|field| is_numeric(field) && (!is_index(field.name()) || is_instant(field)));
+    let (kept, left): (Vec<_>, Vec<_>) = (root.get_fields().iter().cloned()).partition(is_numeric);
     if kept.is_empty() {
         return Err(unusable(
             "no column of the Parquet file holds numbers".to_owned(),
@@ -138,23 +130,47 @@ fn rows_of(path: &Path, notes: &mut Vec<String>) -> io::Result<(RowIter<'static>
     Ok((rows.map_err(broken)?, nanoseconds))
 }
 
-/// Whether a column is an index of pandas without a name.
-fn is_index(name: &str) -> bool {
-    name.starts_with("__index_level_")
-}
-
 fn is_nanoseconds(field: &Arc<Type>) -> bool {
     let kind = field.get_basic_info().logical_type_ref();
     matches!(kind, Some(LogicalType::Timestamp(time)) if matches!(time.unit, TimeUnit::NANOS))
 }
 
-fn is_instant(field: &Arc<Type>) -> bool {
-    let kind = field.get_basic_info().converted_type();
-    let instant = matches!(
-        kind,
-        ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIMESTAMP_MICROS
-    );
-    field.is_primitive() && (instant || is_nanoseconds(field))
+/// The columns of a file, each with its field of the first row that lacks nothing in it, or as much as any row has.
+fn whole_fields(path: &Path) -> io::Result<Vec<(String, Field)>> {
+    let (mut rows, _) = whole(|| rows_of(path, &mut Vec::new()))?;
+    let mut found: Vec<(String, Field)> = Vec::new();
+    while found.is_empty() || !found.iter().all(|(_, field)| is_whole(field)) {
+        let Some(row) = whole(|| rows.next().transpose().map_err(broken))? else {
+            break;
+        };
+        if found.is_empty() {
+            found = row.into_columns();
+            continue;
+        }
+        for ((_, found), (_, field)) in found.iter_mut().zip(row.get_column_iter()) {
+            let count = |field: &Field| {
+                let mut all = Vec::new();
+                leaves(field, String::new(), &mut all);
+                all.len()
+            };
+            if !is_whole(found) && (is_whole(field) || count(field) > count(found)) {
+                *found = field.clone();
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Whether nothing in a field is null, and no list is empty.
+fn is_whole(field: &Field) -> bool {
+    match field {
+        Field::Null => false,
+        Field::Group(row) => row.get_column_iter().all(|(_, field)| is_whole(field)),
+        Field::ListInternal(list) => {
+            !list.elements().is_empty() && list.elements().iter().all(is_whole)
+        }
+        _ => true,
+    }
 }
 
 /// Whether all that a column holds are numbers.
@@ -202,23 +218,33 @@ fn leaves(field: &Field, name: String, out: &mut Vec<String>) {
     }
 }
 
-/// Appends the numbers of a field, a comma behind each; how many they are.
-fn numbers(field: &Field, line: &mut Vec<u8>) -> io::Result<usize> {
-    match field {
-        Field::Group(row) => {
-            let parts = row.get_column_iter().map(|(_, field)| field);
-            return parts.map(|field| numbers(field, line)).sum();
+/// Appends the numbers of a field, a comma behind each, nothing where it lacks what `like` has; how many they are.
+fn numbers(field: &Field, like: &Field, line: &mut Vec<u8>) -> io::Result<usize> {
+    match (field, like) {
+        (Field::Group(row), Field::Group(like)) => {
+            let parts = row.get_column_iter().zip(like.get_column_iter());
+            return (parts.map(|((_, field), (_, like))| numbers(field, like, line))).sum();
         }
-        Field::ListInternal(list) => {
-            let parts = list.elements().iter();
-            return parts.map(|field| numbers(field, line)).sum();
+        (Field::ListInternal(list), Field::ListInternal(like)) if !list.elements().is_empty() => {
+            let likes = like
+                .elements()
+                .iter()
+                .chain(std::iter::repeat(&Field::Null));
+            let parts = list.elements().iter().zip(likes);
+            return parts.map(|(field, like)| numbers(field, like, line)).sum();
         }
-        Field::Null => {}
-        Field::Bool(x) => write!(line, "{}", u8::from(*x))?,
-        Field::Float(x) => number(line, f64::from(*x))?,
-        Field::Double(x) => number(line, *x)?,
-        Field::TimestampMillis(x) | Field::TimestampMicros(x) => write!(line, "{x}")?,
-        other => write!(line, "{other}")?,
+        (Field::Null | Field::ListInternal(_), Field::Group(_) | Field::ListInternal(_)) => {
+            let mut lacking = Vec::new();
+            leaves(like, String::new(), &mut lacking);
+            line.extend(std::iter::repeat_n(b',', lacking.len()));
+            return Ok(lacking.len());
+        }
+        (Field::Null, _) => {}
+        (Field::Bool(x), _) => write!(line, "{}", u8::from(*x))?,
+        (Field::Float(x), _) => number(line, f64::from(*x))?,
+        (Field::Double(x), _) => number(line, *x)?,
+        (Field::TimestampMillis(x) | Field::TimestampMicros(x), _) => write!(line, "{x}")?,
+        (other, _) => write!(line, "{other}")?,
     }
     line.push(b',');
     Ok(1)
@@ -226,9 +252,6 @@ fn numbers(field: &Field, line: &mut Vec<u8>) -> io::Result<usize> {
 
 impl ParquetTable {
     fn next(&mut self) -> io::Result<Option<Row>> {
-        if let Some(first) = self.first.take() {
-            return Ok(Some(first));
-        }
         loop {
             let rows = &mut self.rows;
             if let Some(row) = whole(|| rows.next().transpose().map_err(broken))? {
@@ -252,21 +275,15 @@ impl Table for ParquetTable {
         if row.len() != self.columns.len() {
             return Err(differs("other columns than in the files before".to_owned()));
         }
-        if let Some(clock) = &mut self.clock {
+        if let Some(clock) = &self.clock {
             number(line, clock.time(&row))?;
             line.push(b',');
         }
         for (column, (name, field)) in self.columns.iter().zip(row.get_column_iter()) {
-            let count = match field {
-                Field::Null => {
-                    line.extend(std::iter::repeat_n(b',', column.width));
-                    column.width
-                }
-                field => numbers(field, line)?,
-            };
+            let count = numbers(field, &column.like, line)?;
             if count != column.width || *name != column.name {
                 return Err(differs(format!(
-                    "`{name}` holds {count} numbers where the first row has {} of `{}`",
+                    "`{name}` holds {count} numbers where the rows before have {} of `{}`",
                     column.width, column.name
                 )));
             }
@@ -275,14 +292,6 @@ impl Table for ParquetTable {
         line.pop();
         Ok(true)
     }
-}
-
-/// The description of the dataset that a file belongs to.
-fn described(path: &Path) -> Option<serde_json::Value> {
-    let place = path.ancestors().nth(3)?.join("meta").join("info.json");
-    let small = std::fs::metadata(&place).is_ok_and(|about| about.len() <= DESCRIPTION);
-    let text = small.then(|| std::fs::read_to_string(&place).ok());
-    serde_json::from_str(&text??).ok()
 }
 
 /// What a list of a dataset holds: `names` is a list, or lists by the kind of what they name.
@@ -302,30 +311,15 @@ impl EpisodeClock {
         Some(Self {
             fps,
             frame: place("frame_index")?,
-            episode: place("episode_index")?,
-            before: None,
-            begins: 0.0,
         })
     }
 
     /// The time of a row; NaN where it says none.
-    fn time(&mut self, row: &Row) -> f64 {
-        let whole = |at: usize| match row.get_column_iter().nth(at)?.1 {
-            Field::Long(x) => Some(*x),
-            Field::Int(x) => Some(i64::from(*x)),
-            _ => None,
-        };
-        let (Some(frame), Some(episode)) = (whole(self.frame), whole(self.episode)) else {
-            return f64::NAN;
-        };
-        let own = frame as f64 / self.fps;
-        if let Some((before, last)) = self.before
-            && before != episode
-        {
-            self.begins = last + BETWEEN_EPISODES_S - own;
+    fn time(&self, row: &Row) -> f64 {
+        match row.get_column_iter().nth(self.frame) {
+            Some((_, Field::Long(x))) => *x as f64 / self.fps,
+            Some((_, Field::Int(x))) => f64::from(*x) / self.fps,
+            _ => f64::NAN,
         }
-        let t = self.begins + own;
-        self.before = Some((episode, t));
-        t
     }
 }

@@ -9,12 +9,14 @@ mod line;
 mod listed;
 mod number;
 mod records;
+mod runs;
 mod table;
 
 use std::path::Path;
 
 use self::csv::TextFile;
 pub(super) use self::json_lines::JsonRows;
+use self::runs::TableRuns;
 use super::columns::{Header, ScaledColumn, ScaledColumns, choose};
 use super::content::FileContent;
 use super::layout::Layout;
@@ -29,6 +31,13 @@ const HALF_A_DAY_S: f64 = 43_200.0;
 /// Rows at the beginning of a log that show whether its channels have rows of their own.
 const LOOKED_AT: usize = 10_000;
 
+/// A unit of time, `times` 10^`power` s.
+#[derive(Debug, Clone, Copy)]
+struct ExactUnit {
+    times: i128,
+    power: i32,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct TimeColumn {
     index: usize,
@@ -36,8 +45,9 @@ struct TimeColumn {
     seconds: f64,
     /// Column of what is beyond whole seconds, and the power of ten of a second that it counts.
     rest: Option<(usize, i32)>,
-    /// Dates, and numbers far from zero, are read exactly, in units of 10^power s; known from the first time.
-    exact: Option<Option<i32>>,
+    /// Dates, and numbers far from zero, are read exactly, in units of so many times 10^power s; known from the
+    /// first time.
+    exact: Option<Option<ExactUnit>>,
 }
 
 pub(super) struct TextRows {
@@ -49,6 +59,7 @@ pub(super) struct TextRows {
     strictness: RowStrictness,
     /// The last time of day, and the days that have passed.
     of_day: (Option<Instant>, u32),
+    runs: TableRuns,
     /// What the log was opened by, to look at its beginning again.
     asked: Layout,
 }
@@ -74,6 +85,7 @@ impl TextRows {
             (Err(error), RowStrictness::Record) => (ScaledColumns::default(), Some(error)),
         };
         let mut rows = Self {
+            runs: TableRuns::new(&file.header),
             file,
             time: None,
             even: layout.section.rate_hz.map(|rate| (rate, 0)),
@@ -107,10 +119,10 @@ impl TextRows {
         let exact = match time.exact {
             Some(exact) => exact,
             None => {
-                let power = power_of_ten(time.seconds);
                 let exact = match file.is_date(time.index) {
-                    true => Some(power.unwrap_or(0)),
-                    false => power.filter(|_| seconds().is_some_and(|t| t.abs() >= FAR_S)),
+                    true => Some(ExactUnit { times: 1, power: 0 }),
+                    false => ExactUnit::of(time.seconds)
+                        .filter(|_| seconds().is_some_and(|t| t.abs() >= FAR_S)),
                 };
                 // A first row without a time says nothing.
                 if exact.is_none() {
@@ -120,8 +132,8 @@ impl TextRows {
             }
         };
         match exact {
-            Some(power) => {
-                let instant = file.instant(time.index, power)?;
+            Some(unit) => {
+                let instant = file.instant(time.index, unit.power)?.times(unit.times);
                 if !file.is_time_of_day(time.index) {
                     return Some(RowTime::Exact(instant));
                 }
@@ -159,7 +171,10 @@ impl LogRows for TextRows {
             return Ok(None);
         }
         match (self.stamp(), self.strictness, self.time) {
-            (Some(stamp), ..) => Ok(Some(stamp)),
+            (Some(stamp), ..) => {
+                let number = |place: usize| self.file.number(place);
+                Ok(Some(self.runs.take(stamp, self.even.is_some(), number)))
+            }
             (None, RowStrictness::Refuse, Some(time)) => Err(self.file.no_number(time.index)),
             (None, ..) => Ok(Some(RowTime::NONE)),
         }
@@ -215,6 +230,7 @@ impl LogRows for TextRows {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.file.in_words();
+        out.extend(self.runs.in_words());
         if let Some((time, (rest, _))) = self.time.and_then(|time| Some((time, time.rest?))) {
             let [seconds, rest] = [time.index, rest].map(|column| escape(&self.names()[column]));
             out.push(format!(
@@ -222,6 +238,10 @@ impl LogRows for TextRows {
             ));
         }
         out
+    }
+
+    fn seams(&self) -> Vec<RowTime> {
+        self.runs.seams.clone()
     }
 
     fn place(&self) -> String {
@@ -300,8 +320,17 @@ impl TextRows {
     }
 }
 
-/// Exponent of a power of ten, for those that units of time have.
-fn power_of_ten(factor: f64) -> Option<i32> {
-    let mut known = [(1.0, 0), (1e-3, -3), (1e-6, -6), (1e-9, -9)].into_iter();
-    known.find_map(|(unit, power)| (unit == factor).then_some(power))
+impl ExactUnit {
+    fn of(seconds: f64) -> Option<Self> {
+        let powers = [(1.0, 0), (1e-3, -3), (1e-6, -6), (1e-9, -9)];
+        let known = powers.into_iter().find(|(unit, _)| *unit == seconds);
+        let whole = seconds >= 1.0 && seconds.fract() == 0.0;
+        match known {
+            Some((_, power)) => Some(Self { times: 1, power }),
+            None => whole.then_some(Self {
+                times: seconds as i128,
+                power: 0,
+            }),
+        }
+    }
 }

@@ -159,7 +159,9 @@ fn faults(out: &mut Writer, found: &LogFindings) {
         }
         out.note("", &format!("{}: {spans} s", head.trim_end()), 0);
         out.note("    ", &fault.effect, 4);
-        out.note("    ", &format!("-> {}", fault.remedy), 4);
+        for remedy in fault.remedy.lines() {
+            out.note("    ", &format!("-> {remedy}"), 4);
+        }
     }
 }
 
