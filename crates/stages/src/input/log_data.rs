@@ -9,7 +9,7 @@ use super::log::{Log, arrays_layout, without_rows};
 use super::open_log::OpenLog;
 use super::reference::LoggedReference;
 use super::robot_setup::RobotSetup;
-use cft_ident_logs::log::{Layout, RowFault, escape};
+use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
 use cft_ident_logs::recording::{Recording, RecordingRequest, TorqueCourse};
 
 /// A log that was read.
