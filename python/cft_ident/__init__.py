@@ -20,11 +20,11 @@ or channel, and what to do. Ctrl-C ends a stage; the interpreter's lock is free 
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Union
 
 import numpy as np
@@ -35,17 +35,30 @@ from ._native import (
     CftIdentError,
     InputError,
     Model as _Model,
+    State,
     UndeterminedError,
     UsageError,
     __version__,
 )
-from .results import Diagnosis, Excitation, Fit, Identification, NewRobot, Payload, Result, Simulation, Track
+from .results import (
+    Diagnosis,
+    Excitation,
+    Fit,
+    Identification,
+    NewRobot,
+    Payload,
+    Result,
+    Rows,
+    Simulation,
+    Track,
+    Validation,
+)
 
 __all__ = [
     "CftIdentError", "Diagnosis", "Excitation", "Fit", "Identification", "InputError", "Log", "Model", "NewRobot", "Part",
-    "Payload", "Result", "Robot", "Simulation", "Track", "UndeterminedError", "UsageError", "__version__", "compare",
-    "convert", "diagnose", "example", "excite", "export", "friction", "identify", "inspect", "lsq", "merge", "new",
-    "payload", "reduce", "show", "simulate", "torque", "track", "validate", "watch",
+    "Payload", "Result", "Robot", "Rows", "Simulation", "State", "Track", "UndeterminedError", "UsageError", "Validation",
+    "__version__", "compare", "convert", "diagnose", "example", "excite", "export", "friction", "identify", "inspect",
+    "lsq", "merge", "new", "payload", "reduce", "rows", "show", "simulate", "torque", "track", "validate", "watch",
 ]
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -55,9 +68,10 @@ Array = NDArray[np.float64]
 class Robot:
     """A robot as its file describes it: links, friction law, columns of logs, filters."""
 
-    def __init__(self, native: _native.Robot, path: str | None = None):
+    def __init__(self, native: _native.Robot, path: str | None = None, draft: _Draft | None = None):
         self._native = native
         self._path = path
+        self._draft = draft
 
     @classmethod
     def load(cls, path: PathLike) -> Robot:
@@ -70,15 +84,16 @@ class Robot:
         return cls(_native.Robot.parse(text, name))
 
     @classmethod
-    def from_urdf(cls, path: PathLike, joints: Sequence[str] | None = None) -> Robot:
-        """An arm from its URDF, friction fitted with the inertias; logs have columns ``q_NAME`` and ``tau_NAME``."""
-        lines = ["[robot]", 'model = "serial"', f"urdf = {json.dumps(os.path.abspath(path))}"]
-        lines += ["[friction]", 'law = "viscous-coulomb"', "fitted_with_inertias = true", "offset = true"]
-        with tempfile.TemporaryDirectory() as folder:
-            file = os.path.join(folder, "robot.toml")
-            with open(file, "w", encoding="utf-8") as out:
-                out.write("\n".join(lines) + "\n")
-            robot = cls(_native.Robot.load(file))
+    def from_urdf(cls, path: PathLike, joints: Sequence[str] | None = None, *, log: LogLike | None = None,
+                  tip: str | None = None, cutoff_hz: float | None = None) -> Robot:
+        """The robot whose file :func:`new` would write for this URDF and this log.
+
+        Columns are mapped by their names, and the cut-off of the filter follows the rate. Without ``log`` each stage
+        takes them from the first log that it is given. ``joints`` states the order of the columns of arrays;
+        ``cutoff_hz`` [Hz] stands for the suggested cut-off.
+        """
+        draft = _Draft(os.fspath(path), tip, cutoff_hz)
+        robot = cls(draft.robot(log), draft=draft if log is None else None)
         if joints is not None and list(joints) != robot.joints:
             raise UsageError(f"the URDF has the joints {', '.join(robot.joints)}; give columns in this order")
         return robot
@@ -94,20 +109,67 @@ class Robot:
         return self._native.joints
 
     @property
-    def path(self) -> str:
-        """The file, for what works on files alone."""
-        if self._path is None:
-            raise UsageError(f"{self.name}: this robot is no file; write it into one and use Robot.load")
-        return self._path
+    def text(self) -> str:
+        """The robot file as TOML, with the links and limits of its URDF in it."""
+        return self._native.text
+
+    def save(self, path: PathLike) -> None:
+        """Write the robot file."""
+        with open(path, "w", encoding="utf-8", newline="\n") as file:
+            file.write(self.text)
+
+    def _for(self, logs: LogLike | Iterable[LogLike]) -> _native.Robot:
+        """The robot by which these logs are read."""
+        if self._draft is None:
+            return self._native
+        return self._draft.robot(next(iter(_several(logs)), None))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_robot_again, (self.text, self.name, self._path, self._draft))
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, joints={self.joints})"
 
 
+def _robot_again(text: str, name: str, path: str | None, draft: _Draft | None) -> Robot:
+    return Robot(_native.Robot.parse(text, name), path, draft)
+
+
+@dataclass(frozen=True)
+class _Draft:
+    """What a robot file is drafted from."""
+
+    urdf: str
+    tip: str | None
+    cutoff_hz: float | None
+
+    def robot(self, log: LogLike | None) -> _native.Robot:
+        """The robot that ``new`` drafts of the URDF and a log; without one its columns are ``q_NAME`` and ``tau_NAME``."""
+        with _Files() as files:
+            file = files.new("robot.toml")
+            line = ["new", file, "--urdf", self.urdf] + ([] if self.tip is None else ["--tip", self.tip])
+            arrays = isinstance(log, Log) and log._path is None
+            if isinstance(log, Log) and arrays:
+                _native.run([*line, "-q"])
+                joints = _native.Robot.load(file).joints
+                os.remove(file)
+                line += ["--log", files.arrays(log, joints)]
+            elif log is not None and not isinstance(log, Part) and not str(log).endswith(".cfi"):
+                line += ["--log", log._path or "" if isinstance(log, Log) else os.fspath(log)]
+            _native.run([*line, "-q"])
+            with open(file, encoding="utf-8") as draft:
+                text = draft.read()
+            if self.cutoff_hz is not None:
+                text = re.sub(r"^(# )?cutoff_hz = \S+", f"cutoff_hz = {float(self.cutoff_hz)!r}", text, flags=re.MULTILINE)
+            if arrays:
+                text = _own_columns(text)
+            return _native.Robot.parse(text, os.path.basename(self.urdf), os.path.dirname(file))
+
+
 class Log:
     """A log: a file or a part of it, or arrays in memory."""
 
-    def __init__(self, native: _native.Log, path: str | None = None, arrays: tuple[Array, Array, Array] | None = None):
+    def __init__(self, native: _native.Log, path: str | None = None, arrays: dict[str, Any] | None = None):
         self._native = native
         self._path = path
         self._arrays = arrays
@@ -122,22 +184,24 @@ class Log:
                temperature: ArrayLike | None = None, name: str = "arrays") -> Log:
         """Times ``t`` [s], positions ``q`` and torques ``tau``, one row per sample, one column per joint, SI units.
 
-        ``reference`` are the positions that the controller was asked for, for ``estimator="iv"``; ``temperature``
-        those of the drives [degC], a column of NaN for a joint without one.
+        Angles are in rad: ``numpy.radians(q)`` of degrees. ``reference`` are the positions that the controller was asked
+        for, for ``estimator="iv"``; ``temperature`` those of the drives [degC], a column of NaN for a joint without one.
         """
-        flat = np.ascontiguousarray(t, dtype=np.float64)
-
-        def matrix(values: ArrayLike) -> Array:
-            found: Array = np.ascontiguousarray(values, dtype=np.float64)
-            return found.reshape(len(flat), -1) if found.ndim == 1 and len(flat) else found
-
-        other = None if reference is None else matrix(reference)
-        warm = None if temperature is None else matrix(temperature)
-        positions, torques = matrix(q), matrix(tau)
-        native = _native.Log.arrays(name, flat, positions, torques, other, warm)
-        # a command that works on files gets these three; what else there is it cannot be told
-        kept = None if other is not None or warm is not None else (flat, positions, torques)
-        return cls(native, arrays=kept)
+        times = np.ascontiguousarray(t, dtype=np.float64)
+        if times.ndim != 1:
+            raise UsageError(f"t has shape {times.shape}: give one time per sample, (N,); the order is t, q, tau")
+        backwards = np.flatnonzero(~(np.diff(times) >= 0))
+        if backwards.size:
+            raise UsageError(f"t runs backwards after row {backwards[0]}: give times [s] first; the order is t, q, tau")
+        positions = _samples("q", q, len(times))
+        torques = _samples("tau", tau, len(times), positions.shape)
+        more = {
+            "reference": None if reference is None else _samples("reference", reference, len(times), positions.shape),
+            "temperature": None if temperature is None
+            else _samples("temperature", temperature, len(times), positions.shape, holes=True),
+        }
+        given: dict[str, Any] = {"name": name, "t": times, "q": positions, "tau": torques, **more}
+        return cls(_native.Log.arrays(**given), arrays=given)
 
     @classmethod
     def frame(cls, frame: Any, joints: Sequence[str], *, t: str = "t", q: str = "q_{}", tau: str = "tau_{}",
@@ -153,14 +217,44 @@ class Log:
         """Name of the log in results."""
         return self._native.name
 
+    @property
+    def _more(self) -> bool:
+        """Whether it has more than a file of arrays holds."""
+        return any((self._arrays or {}).get(name) is not None for name in ("reference", "temperature"))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_log_again, (self._path, self._arrays))
+
     def __repr__(self) -> str:
         return f"Log({self.name!r})"
+
+
+def _log_again(path: str | None, arrays: dict[str, Any] | None) -> Log:
+    return Log.arrays(**arrays) if arrays is not None else Log.load(str(path))
+
+
+def _samples(name: str, values: ArrayLike, count: int, shape: tuple[int, ...] | None = None, *, holes: bool = False) -> Array:
+    """One row per sample and one column per joint, of finite numbers unless there may be holes."""
+    found: Array = np.ascontiguousarray(values, dtype=np.float64)
+    if found.ndim == 1 and len(found) == count:
+        found = found.reshape(count, 1)
+    wanted = shape or (count, found.shape[-1])
+    if found.shape != wanted:
+        raise UsageError(f"{name} has shape {found.shape}; give one row per time and one column per joint, "
+                         f"({count}, {shape[1] if shape else 'joints'}); the order is t, q, tau")
+    if not holes and not np.isfinite(found).all():
+        row, column = np.argwhere(~np.isfinite(found))[0]
+        raise UsageError(f"{name} is {found[row, column]} in row {row}, column {column}: leave such rows out, or give the "
+                         "part before and the part after as two logs")
+    return found
 
 
 LogLike = Union[PathLike, Log, "Part"]
 
 
 def _several(logs: LogLike | Iterable[LogLike]) -> list[LogLike]:
+    if isinstance(logs, (Robot, Model)):
+        raise UsageError(f"a log is asked for, and here is {logs!r}: give the robot or model first, then the logs")
     return [logs] if isinstance(logs, (str, os.PathLike, Log, Part)) else list(logs)
 
 
@@ -205,19 +299,21 @@ class _Files:
             return path
         if not isinstance(log, Log):
             return os.fspath(log)
-        if log._path is not None:
-            return log._path
-        if log._arrays is None:
+        return log._path if log._path is not None else self.arrays(log, joints)
+
+    def arrays(self, log: Log, joints: Sequence[str] | None) -> str:
+        """The file of a log of arrays, with columns named after the joints."""
+        given = log._arrays or {}
+        if log._more:
             raise UsageError(f"{log.name}: this function takes arrays without references and temperatures")
-        t, q, tau = log._arrays
+        q, tau = given["q"], given["tau"]
         names = list(joints) if joints is not None else [f"q{k + 1}" for k in range(q.shape[1])]
-        if not len(names) == q.shape[1] == tau.shape[1]:
-            raise UsageError(f"{log.name}: {q.shape[1]} columns of positions and {tau.shape[1]} of torques, and the "
-                             f"robot has the joints {', '.join(names)}")
+        if len(names) != q.shape[1]:
+            raise UsageError(f"{log.name}: q and tau have {q.shape[1]} columns, and the robot has the joints {', '.join(names)}")
         columns: dict[str, Any] = {f"q_{name}": q[:, k] for k, name in enumerate(names)}
         columns |= {f"tau_{name}": tau[:, k] for k, name in enumerate(names)}
         path = self.new(f"{log.name}.npz")
-        np.savez(path, **columns, t=t)
+        np.savez(path, **columns, t=given["t"])
         return path
 
     def model(self, model: Model | PathLike) -> str:
@@ -226,38 +322,59 @@ class _Files:
             if not self.of_arrays:
                 return os.fspath(model)
             model = Model.load(model)
-        path = self.new(f"model-{len(os.listdir(self._folder.name))}.toml")
+        return self._written("model", model.text)
+
+    def robot(self, robot: Robot | PathLike, logs: LogLike | Iterable[LogLike] = ()) -> str:
+        """The path of a robot file that reads these logs."""
+        if not isinstance(robot, Robot):
+            if not self.of_arrays:
+                return os.fspath(robot)
+            robot = Robot.load(robot)
+        if robot._path is not None and not self.of_arrays:
+            return robot._path
+        return self._written("robot", robot._for(logs).text)
+
+    def _written(self, what: str, text: str) -> str:
+        path = self.new(f"{what}-{len(os.listdir(self._folder.name))}.toml")
         with open(path, "w", encoding="utf-8", newline="\n") as file:
-            file.write(_own_columns(model.text) if self.of_arrays else model.text)
+            file.write(_own_columns(text) if self.of_arrays else text)
         return path
 
-    def robot(self, robot: Robot | PathLike) -> str:
-        """The path of a robot file that reads these logs."""
-        path = robot.path if isinstance(robot, Robot) else os.fspath(robot)
-        if not self.of_arrays or not os.path.exists(path):
-            return path
-        with open(path, encoding="utf-8") as file:
-            text = _own_columns(file.read())
-        # beside the given one, so that its URDF is found
-        folder = os.path.dirname(os.path.abspath(path))
-        text = re.sub(r'^urdf = "(?!/)', lambda _: f'urdf = "{folder}/', text, flags=re.MULTILINE)
-        own = self.new("robot.toml")
-        with open(own, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        return own
 
-    def page(self, line: list[str]) -> str:
-        """The page of a command line."""
-        path = self.new("report.html")
-        _native.run([*line, "--report", path])
-        with open(path, encoding="utf-8") as file:
-            return file.read()
+@dataclass
+class _Page:
+    """The page of a command, made when it is first asked for; none of arrays that no file can hold."""
+
+    command: str
+    logs: list[LogLike]
+    robot: Robot | PathLike | None = None
+    model: Model | PathLike | None = None
+    holdout: list[LogLike] = field(default_factory=list)
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def line(self, files: _Files) -> list[str]:
+        """The command line on these files."""
+        joints = _robot(self.robot, self.logs).joints if self.robot is not None else _given(self.model).joints
+        words = [self.command, *files.logs(self.logs, joints)]
+        words += [] if self.robot is None else ["-r", files.robot(self.robot, self.logs)]
+        words += [] if self.model is None else ["-m", files.model(self.model)]
+        for log in files.logs(self.holdout, joints):
+            words += ["--holdout", log]
+        return words + _options(self.options)
+
+    def __call__(self) -> str | None:
+        if any(isinstance(log, Log) and log._more for log in [*self.logs, *self.holdout]):
+            return None
+        with _Files(self.logs, self.holdout) as files:
+            path = files.new("report.html")
+            output = [] if self.command == "validate" else ["-o", files.new("written.toml")]
+            _native.run([*self.line(files), *output, "--report", path])
+            with open(path, encoding="utf-8") as file:
+                return file.read()
 
 
 def _logs(logs: LogLike | Iterable[LogLike]) -> list[_native.Log]:
-    if isinstance(logs, (str, os.PathLike, Log, Part)):
-        logs = [logs]
-    return [_log(log) for log in logs]
+    return [_log(log) for log in _several(logs)]
 
 
 def _log(log: LogLike) -> _native.Log:
@@ -265,11 +382,19 @@ def _log(log: LogLike) -> _native.Log:
         return log._native
     if isinstance(log, Part):
         return log._native.as_log()
+    if not isinstance(log, (str, os.PathLike)):
+        raise UsageError(f"a log is asked for, and here is {log!r}; arrays come in by Log.arrays(t, q, tau)")
+    if os.fspath(log).endswith((".toml", ".urdf")):
+        raise UsageError(f"a log is asked for, and {os.fspath(log)} is a robot or model: give that first, then the logs")
     return _native.Log.load(os.fspath(log))
 
 
-def _robot(robot: Robot | PathLike) -> _native.Robot:
-    return (robot if isinstance(robot, Robot) else Robot.load(robot))._native
+def _robot(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike] = ()) -> _native.Robot:
+    if isinstance(robot, Robot):
+        return robot._for(logs)
+    if not isinstance(robot, (str, os.PathLike)):
+        raise UsageError(f"a robot or the path of its file is asked for first, and here is {robot!r}")
+    return _native.Robot.load(os.fspath(robot))
 
 
 class Model:
@@ -337,17 +462,22 @@ class Model:
         ``q``, ``v``, ``a``: arrays of shape (N, n) or (n,), in m or rad and per s. Returns the same shape, in N or
         N m. ``dt`` [s] is the time between rows, where effects of the model remember the motion.
         """
-        (q, v, a), one = _motion(q, v, a)
-        tau = _native.torque(self._native, q, v, a, dt)
-        return tau[0] if one else tau
+        return _native.torque(self._native, _rows(q), _rows(v), _rows(a), dt)
+
+    def start(self, q: ArrayLike) -> State:
+        """The model at rest in the pose ``q``, for one step a sample: ``state.step(dt, q, v, a)``.
+
+        What effects remember is kept from step to step, as ``_init`` and ``_step`` of exported C do.
+        """
+        return State(self._native, _rows(q))
+
+    def load_torque(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Torques of links and drives, without friction, offsets and effects: (N, n) or (n,), in N or N m."""
+        return _native.load(self._native, _rows(q), _rows(v), _rows(a))
 
     def gravity(self, q: ArrayLike) -> Array:
         """Torques that carry the links at rest, without friction: (N, n) or (n,), in N or N m."""
-        (q,), one = _motion(q)
-        still = np.zeros_like(q)
-        rows = _native.regressor(self._native, q, still, still)
-        weight: Array = rows @ self._theta()
-        return weight[0] if one else weight
+        return _native.gravity(self._native, _rows(q))
 
     def friction(self, v: ArrayLike) -> Array:
         """Friction of each joint at the velocities ``v``: (N, n) or (n,), in N or N m.
@@ -355,9 +485,7 @@ class Model:
         The declared law with the effects that depend on a joint's speed alone, as exported code has it: none where it
         would drive the joint.
         """
-        (v,), one = _motion(v)
-        found = _native.joint_friction(self._native, v)
-        return found[0] if one else found
+        return _native.joint_friction(self._native, _rows(v))
 
     def friction_compensation(self, v: ArrayLike, v_desired: ArrayLike) -> Array:
         """Friction for a controller to add, silent at rest: (N, n) or (n,), in N or N m.
@@ -366,39 +494,29 @@ class Model:
         friction of its desired speed; one that is told to rest that of its measured speed, and nothing below a hundredth
         of its speed limit (0.01 rad/s or 1 mm/s where the robot file gives none). Continuous in both.
         """
-        (v, wanted), one = _motion(v, v_desired)
+        v, wanted = _rows(v), _rows(v_desired)
         rest = np.array(_native.rest_speeds(self._native))
         share = np.minimum(np.abs(wanted) / rest, 1.0)
         felt = np.clip(np.abs(v) / rest - 1.0, 0.0, 1.0)
         tau: Array = share * self.friction(wanted) + (1.0 - share) * felt * self.friction(v)
-        return tau[0] if one else tau
+        return tau
 
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """The matrix Y of the inertial parameters: (N, n, p), or (n, p) for one row."""
-        (q, v, a), one = _motion(q, v, a)
-        rows = _native.regressor(self._native, q, v, a)
-        return rows[0] if one else rows
+        return _native.regressor(self._native, _rows(q), _rows(v), _rows(a))
 
     def regressor_blocks(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, rows: int = 10_000) -> Iterator[Array]:
         """The matrices Y of so many rows after one another, (rows, n, p) each: all together may not fit into memory.
 
         Contiguous arrays of floats are not copied.
         """
-        (q, v, a), _ = _motion(q, v, a)
-        for first in range(0, len(q), rows):
-            block = slice(first, first + rows)
-            yield _native.regressor(self._native, q[block], v[block], a[block])
+        motion = [np.atleast_2d(_rows(x)) for x in (q, v, a)]
+        for first in range(0, len(motion[0]), rows):
+            yield self.regressor(*(x[first : first + rows] for x in motion))
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """The mass matrix: (N, n, n), or (n, n) for one row, in kg, kg m or kg m^2."""
-        (q,), one = _motion(q)
-        mass = _native.mass_matrix(self._native, q)
-        return mass[0] if one else mass
-
-    def _theta(self) -> Array:
-        """Inertial parameters in use, in the order of the regressor's columns."""
-        rows = self._native.parameters
-        return np.array([in_use for _, joint, _, _, in_use, _ in rows if joint is None])
+        return _native.mass_matrix(self._native, _rows(q))
 
     def to_urdf(self, path: PathLike, source: PathLike | None = None) -> Result:
         """Write the model as URDF, with a model file of the rest beside it; ``source`` is one whose meshes are kept."""
@@ -428,23 +546,28 @@ class Model:
         """Write the model for Isaac Sim."""
         return export(self, usd=path)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Model.parse, (self.text, self._native.name))
+
     def __repr__(self) -> str:
         return f"Model({self._native.name!r}, {len(self._native.parameters)} parameters)"
 
 
-def _motion(*arrays: ArrayLike) -> tuple[list[Array], bool]:
-    """Arrays of one motion, row after row, and whether they are of one row."""
-    found = [np.ascontiguousarray(x, dtype=np.float64) for x in arrays]
-    one = all(x.ndim == 1 for x in found)
-    return [np.atleast_2d(x) for x in found], one
+def _rows(values: ArrayLike) -> Array:
+    """One sample or rows of samples, contiguous."""
+    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def _model(model: Model | PathLike | None) -> _Model | None:
     return None if model is None else _given(model)
 
 
-def _given(model: Model | PathLike) -> _Model:
-    return (model if isinstance(model, Model) else Model.load(model))._native
+def _given(model: Model | PathLike | None) -> _Model:
+    if isinstance(model, Model):
+        return model._native
+    if not isinstance(model, (str, os.PathLike)):
+        raise UsageError(f"a model or the path of its file is asked for first, and here is {model!r}")
+    return _native.Model.load(os.fspath(model))
 
 
 class Part:
@@ -488,18 +611,20 @@ class Part:
 def inspect(logs: LogLike | Iterable[LogLike], robot: Robot | PathLike | None = None) -> Result:
     """What logs hold and what is wrong with them."""
     with _Files(logs) as files:
-        joints = None if robot is None else _robot(robot).joints
+        joints = None if robot is None else _robot(robot, logs).joints
         line = ["inspect", *files.logs(logs, joints)]
         if robot is not None:
-            line += ["-r", files.robot(robot)]
+            line += ["-r", files.robot(robot, logs)]
         return Result(*_command(line))
 
 
 def friction(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, joint: str | None = None,
              model: Model | PathLike | None = None, as_declared: bool = False) -> Fit:
     """Friction of joints from logs of one joint each; ``model`` is renewed in the joints that the logs move."""
-    told, found = _native.friction(_robot(robot), _logs(logs), joint, _model(model), as_declared)
-    return Fit(*told, Model(found))
+    logs = _several(logs)
+    told, found = _native.friction(_robot(robot, logs), _logs(logs), joint, _model(model), as_declared)
+    options = {"joint": joint, "as_declared": as_declared}
+    return Fit(*told, Model(found), _Page("friction", logs, robot, model, options=options), logs)
 
 
 def lsq(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, model: Model | PathLike | None = None,
@@ -511,27 +636,24 @@ def lsq(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, model: Mo
     plain fit and beside it the nearest parameters of links, drives and friction that can exist, which torques are computed
     with; ``unconstrained`` leaves those out.
     """
-    def page() -> str:
-        with _Files(logs) as files:
-            line = ["lsq", *files.logs(logs, _robot(robot).joints), "-r", files.robot(robot), "--estimator", estimator]
-            line += [] if model is None else ["-m", files.model(model)]
-            line += _options({"unconstrained": unconstrained, "hold_friction": hold_friction, "as_declared": as_declared})
-            return files.page([*line, "-o", files.new("fitted.toml")])
-
-    told, found = _native.lsq(_robot(robot), _logs(logs), _model(model), estimator, unconstrained, hold_friction,
+    logs = _several(logs)
+    told, found = _native.lsq(_robot(robot, logs), _logs(logs), _model(model), estimator, unconstrained, hold_friction,
                               as_declared)
-    return Fit(*told, Model(found), page if isinstance(robot, (str, os.PathLike)) or robot._path else None)
+    options = {"estimator": estimator, "unconstrained": unconstrained, "hold_friction": hold_friction,
+               "as_declared": as_declared}
+    return Fit(*told, Model(found), _Page("lsq", logs, robot, model, options=options), logs)
 
 
-def validate(model: Model | PathLike, logs: LogLike | Iterable[LogLike]) -> Result:
+def validate(model: Model | PathLike, logs: LogLike | Iterable[LogLike]) -> Validation:
     """How far the torques of logs are off that were not used."""
-    def page() -> str:
-        with _Files(logs) as files:
-            joints = _given(model).joints
-            return files.page(["validate", *files.logs(logs, joints), "-m", files.model(model)])
+    logs = _several(logs)
+    given = _given(model)
+    return Validation(*_native.validate(given, _logs(logs)), Model(given), _Page("validate", logs, model=model), logs)
 
-    document, short, text = _native.validate(_given(model), _logs(logs))
-    return Result(document, short, text, page)
+
+def rows(model: Model | PathLike, logs: LogLike | Iterable[LogLike]) -> Rows:
+    """Measured and reconstructed torque of every row of logs, as arrays."""
+    return Rows(*_native.rows(_given(model), _logs(logs)))
 
 
 def diagnose(model: Model | PathLike, logs: LogLike | Iterable[LogLike], *,
@@ -542,21 +664,13 @@ def diagnose(model: Model | PathLike, logs: LogLike | Iterable[LogLike], *,
     ``accept`` names effects to write whatever the data say, ``"backlash:q4"``; ``search`` looks for a formula for what is
     left; ``candidates`` is a file of formulas of your own.
     """
-    def line(files: _Files) -> list[str]:
-        joints = _given(model).joints
-        words = ["diagnose", *files.logs(logs, joints), "-m", files.model(model)]
-        for log in files.logs(holdout, joints):
-            words += ["--holdout", log]
-        return words + _options({"keep": keep, "accept": list(accept), "search": search, "candidates": candidates})
-
-    def page() -> str:
-        with _Files(logs, holdout) as files:
-            return files.page(line(files))
-
+    logs, holdout = _several(logs), _several(holdout)
+    options = {"keep": keep, "accept": list(accept), "search": search, "candidates": candidates}
+    page = _Page("diagnose", logs, model=model, holdout=holdout, options=options)
     if accept or search or candidates is not None:
         with _Files(logs, holdout) as files:
             refined = files.new("refined.toml")
-            document, _, text = _command([*line(files), "-o", refined])
+            document, _, text = _command([*page.line(files), "-o", refined])
             return Diagnosis(document, None, text, Model.load(refined), page)
     (document, short, text), found = _native.diagnose(_given(model), _logs(logs), _logs(holdout), keep)
     return Diagnosis(document, short, text, None if found is None else Model(found), page)
@@ -565,7 +679,8 @@ def diagnose(model: Model | PathLike, logs: LogLike | Iterable[LogLike], *,
 def reduce(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, model: Model | PathLike | None = None,
            as_declared: bool = False) -> Part:
     """What a linear fit needs of logs; it stands where ``lsq`` and ``validate`` take a log."""
-    return Part(_native.reduce(_robot(robot), _logs(logs), _model(model), as_declared))
+    logs = _several(logs)
+    return Part(_native.reduce(_robot(robot, logs), _logs(logs), _model(model), as_declared))
 
 
 def merge(parts: Iterable[Part]) -> Part:
@@ -617,11 +732,10 @@ def excite(robot: Robot | PathLike, output: PathLike, *, model: Model | PathLike
     ``settings`` are options of the command: ``joint="q4"``, ``criterion="d-optimal"``, ``periods=8``, ``seed=1``,
     ``with_=["monday.csv"]``, ``samples="motion.csv"``.
     """
-    path = robot.path if isinstance(robot, Robot) else os.fspath(robot)
     words = _options({name.rstrip("_"): value for name, value in settings.items()})
-    with _as_file(model) as file:
-        given = ["-m", file] if file is not None else []
-        told = _command(["excite", "-r", path, *given, *words, "-o", os.fspath(output)])
+    with _Files() as files:
+        given = [] if model is None else ["-m", files.model(model)]
+        told = _command(["excite", "-r", files.robot(robot), *given, *words, "-o", os.fspath(output)])
     return Excitation(*told, os.fspath(output))
 
 
@@ -632,37 +746,31 @@ def simulate(robot: Robot | PathLike, output: PathLike, *, model: Model | PathLi
     ``effects`` are as on the command line, ``"ripple:q5"``; ``settings`` are its options: ``move="q4"``,
     ``reference="motion.toml"``, ``seconds=20.0``.
     """
-    path = robot.path if isinstance(robot, Robot) else os.fspath(robot)
     words = _options({**settings, "effect": list(effects), "seed": seed})
-    with _as_file(model) as file:
-        given = ["-m", file] if file is not None else []
-        return Simulation(*_command(["simulate", "-r", path, *given, *words, "-o", os.fspath(output)]),
-                          os.fspath(output))
+    with _Files() as files:
+        given = [] if model is None else ["-m", files.model(model)]
+        told = _command(["simulate", "-r", files.robot(robot), *given, *words, "-o", os.fspath(output)])
+    return Simulation(*told, os.fspath(output))
 
 
-def identify(urdf: PathLike, logs: LogLike | Iterable[LogLike], output: PathLike = "cft-ident-run") -> Identification:
+def identify(urdf: Robot | PathLike, logs: LogLike | Iterable[LogLike],
+             output: PathLike = "cft-ident-run") -> Identification:
     """Everything from a URDF (or a robot file) and logs: fit, held-out errors, effects that are missing.
 
     Models, pages and the robot file stand in the folder ``output``; ``.model`` is the one to use.
     """
     folder = os.fspath(output)
     with _Files(logs) as files:
-        robot = os.fspath(urdf)
-        joints = None
-        if files.of_arrays:
-            is_file = robot.endswith(".toml")
-            joints = Robot.load(robot).joints if is_file else Robot.from_urdf(robot).joints
-            robot = files.robot(robot) if is_file else robot
-        document, _, text = _command(["identify", robot, *files.logs(logs, joints), "-o", folder])
+        drafted = files.of_arrays and not isinstance(urdf, Robot) and not os.fspath(urdf).endswith(".toml")
+        robot = Robot.from_urdf(urdf) if drafted and not isinstance(urdf, Robot) else urdf
+        joints = _robot(robot, logs).joints if files.of_arrays else None
+        document, _, text = _command(["identify", files.robot(robot, logs), *files.logs(logs, joints), "-o", folder])
     kept = [name for name in ("refined.toml", "model.toml") if os.path.exists(os.path.join(folder, name))]
-    page = os.path.join(folder, "report.html")
-    html = None
-    if os.path.exists(page):
-        with open(page, encoding="utf-8") as file:
-            html = file.read()
     if not kept:
         raise InputError(f"{folder}: no model was written there")
-    return Identification(document, html, text, Model.load(os.path.join(folder, kept[0])), folder)
+    with open(os.path.join(folder, "report.html"), encoding="utf-8") as file:
+        page = file.read()
+    return Identification(document, page, text, Model.load(os.path.join(folder, kept[0])), folder)
 
 
 @contextlib.contextmanager
@@ -705,14 +813,14 @@ def compare(one: Model | PathLike, other: Model | PathLike, logs: LogLike | Iter
         return Result(*_command(["compare", *both, *files.logs(logs, _given(one).joints)]))
 
 
-def watch(model: Model | PathLike, log: PathLike, output: PathLike, **settings: Any) -> Result:
-    """Write the torques [N or N m] that push a robot from outside along a log file, as CSV or MCAP; alarms are told.
+def watch(model: Model | PathLike, log: LogLike, output: PathLike, **settings: Any) -> Result:
+    """Write the torques [N or N m] that push a robot from outside along a log, as CSV or MCAP; alarms are told.
 
     ``settings`` are the options of the command: ``false_alarms=0.1`` (an hour), ``unloaded="empty.csv"``.
     """
-    with _as_file(model) as path:
-        words = _options(settings)
-        return Result(*_command(["watch", os.fspath(log), "-m", str(path), *words, "-o", os.fspath(output)]))
+    with _Files(log) as files:
+        words = files.logs(log, _given(model).joints)
+        return Result(*_command(["watch", *words, "-m", files.model(model), *_options(settings), "-o", os.fspath(output)]))
 
 
 def show(model: Model | PathLike) -> Result:
@@ -724,14 +832,9 @@ def show(model: Model | PathLike) -> Result:
 def convert(logs: PathLike | Iterable[PathLike], output: PathLike, *, robot: Robot | PathLike | None = None,
             **settings: Any) -> Result:
     """Write log files as one of another format (CSV, MCAP, Parquet); with ``robot`` in joints, m or rad, N or N m."""
-    words = _options(settings)
-    if robot is not None:
-        words += ["-r", robot.path if isinstance(robot, Robot) else os.fspath(robot)]
-    return Result(*_command(["convert", *words, *_files(logs), os.fspath(output)]))
-
-
-def _files(logs: PathLike | Iterable[PathLike]) -> list[str]:
-    return [os.fspath(file) for file in ([logs] if isinstance(logs, (str, os.PathLike)) else logs)]
+    with _Files() as files:
+        words = _options(settings) + ([] if robot is None else ["-r", files.robot(robot, logs)])
+        return Result(*_command(["convert", *words, *files.logs(logs), os.fspath(output)]))
 
 
 def example(name: str, folder: PathLike) -> Result:
@@ -763,11 +866,15 @@ def export(model: Model | PathLike, *, urdf: PathLike | None = None, c: PathLike
     outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust), ("--mjcf", mjcf), ("--sdf", sdf), ("--usd", usd),
                ("--ros2-control", ros2_control), ("--urdf-source", urdf_source), ("--mjcf-source", mjcf_source)]
     with _as_file(model) as path:
-        line = ["export", "-m", str(path), *_files(logs)]
+        line = ["export", "-m", str(path), *_paths(logs)]
         for option, output in outputs:
             line += [option, os.fspath(output)] if output is not None else []
         line += ["--mujoco-damping"] if mujoco_damping else []
         return Result(*_command(line))
+
+
+def _paths(files: PathLike | Iterable[PathLike]) -> list[str]:
+    return [os.fspath(file) for file in ([files] if isinstance(files, (str, os.PathLike)) else files)]
 
 
 def _command(line: list[str]) -> tuple[str, None, str]:

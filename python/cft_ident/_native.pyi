@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "__version__", "CftIdentError", "UsageError", "InputError", "UndeterminedError", "Robot", "Log", "Model", "Part",
-    "run", "main", "friction", "lsq", "validate", "diagnose", "reduce", "torque", "regressor", "joint_friction",
+    "State", "run", "main", "friction", "lsq", "validate", "rows", "diagnose", "reduce", "torque", "load", "gravity",
+    "regressor", "joint_friction",
     "rest_speeds", "mass_matrix", "covariance", "merge", "track",
 ]
 
@@ -22,9 +23,11 @@ class Robot:
     @staticmethod
     def load(path: str) -> Robot: ...
     @staticmethod
-    def parse(text: str, name: str) -> Robot: ...
+    def parse(text: str, name: str, folder: str | None = None) -> Robot: ...
     @property
     def name(self) -> str: ...
+    @property
+    def text(self) -> str: ...
     @property
     def joints(self) -> list[str]: ...
 
@@ -72,6 +75,14 @@ class Part:
     @property
     def logs(self) -> list[tuple[str, str, int, float, tuple[float, float], int]]: ...
 
+@final
+class State:
+    t: float
+    def __new__(cls, model: Model, q: NDArray[np.float64]) -> State: ...
+    def step(
+        self, dt: float, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
+    ) -> NDArray[np.float64]: ...
+
 _Told = tuple[str, str, str]
 
 def run(arguments: list[str]) -> tuple[str, str]: ...
@@ -89,6 +100,15 @@ def lsq(
     as_declared: bool,
 ) -> tuple[_Told, Model]: ...
 def validate(model: Model, logs: Sequence[Log]) -> _Told: ...
+def rows(model: Model, logs: Sequence[Log]) -> tuple[
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.bool_],
+]: ...
 def diagnose(
     model: Model, logs: Sequence[Log], holdout: Sequence[Log], keep: bool
 ) -> tuple[_Told, Model | None]: ...
@@ -96,6 +116,10 @@ def reduce(robot: Robot, logs: Sequence[Log], model: Model | None, as_declared: 
 def torque(
     model: Model, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64], dt: float | None
 ) -> NDArray[np.float64]: ...
+def load(
+    model: Model, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
+def gravity(model: Model, q: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def regressor(
     model: Model, q: NDArray[np.float64], v: NDArray[np.float64], a: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...

@@ -5,16 +5,17 @@ from __future__ import annotations
 import html
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from . import Model
+    from . import Array, Model
 
 
 class Result:
     """What a stage found: ``to_dict`` is the JSON document of the command, ``html`` its page, ``str`` its tables."""
 
-    def __init__(self, document: str, page: str | None, text: str, full: Callable[[], str] | None = None):
+    def __init__(self, document: str, page: str | None, text: str, full: Callable[[], str | None] | None = None):
         self.json = document
         self._page = page
         self._text = text
@@ -24,24 +25,44 @@ class Result:
     def html(self) -> str | None:
         """The page of the command, made when it is first asked for; ``None`` where the command has none."""
         if self._full is not None:
-            self._page, self._full = self._full(), None
+            self._page, self._full = self._full() or self._page, None
         return self._page
 
     @property
     def errors(self) -> dict[str, Any]:
-        """Relative torque errors as arrays in the order of ``joint``; of a diagnosis ``before`` and ``after``."""
+        """Relative torque errors as they are printed, as arrays in the order of ``joint``.
+
+        ``error`` is that of rows in motion, ``error_all_rows`` has the rows at rest with it; of a diagnosis they are
+        ``before`` and ``after``, ``before_all_rows`` and ``after_all_rows``.
+        """
         import numpy as np
 
         document = self.to_dict()
-        sides = [side for side in ("before", "after") if side in document]
+        # a campaign holds its validation and its fit, the errors are those of what was not fitted
+        document = document.get("validate") or document.get("lsq") or document
+        sides = [side for side in ("before", "after") if isinstance(document.get(side), dict)]
         parts: dict[str, dict[str, Any]] = {side: document[side].get("holdout") or document[side]["train"] for side in sides}
         parts = parts or {"error": document}
-        rows = {side: part["joints"] for side, part in parts.items()}
-        first = next(iter(rows.values()))
-        found: dict[str, Any] = {"joint": [row["joint"] for row in first]}
-        for side, of in rows.items():
-            found[side] = np.array([row["relative_error"] for row in of], dtype=float)
+        found: dict[str, Any] = {}
+        for side, part in parts.items():
+            rows = part.get("joints") or []
+            if not rows or "relative_error" not in rows[0]:
+                raise AttributeError(f"{type(self).__name__} has no errors of torques")
+            found["joint"] = [row["joint"] for row in rows]
+            moving = [row.get("relative_error_moving") for row in rows]
+            every = [row["relative_error"] for row in rows]
+            found[side] = np.array([b if a is None else a for a, b in zip(moving, every)], dtype=float)
+            found[f"{side}_all_rows"] = np.array(every, dtype=float)
         return found
+
+    @property
+    def error(self) -> float:
+        """The relative torque error as it is printed: rms of the joints' errors in motion."""
+        import numpy as np
+
+        found = self.errors
+        sizes = found["after"] if "after" in found else found["error"]
+        return float(np.sqrt(np.mean(np.square(sizes))))
 
     def to_dict(self) -> dict[str, Any]:
         """The document; undetermined numbers are ``None``."""
@@ -72,16 +93,72 @@ class Result:
     def __str__(self) -> str:
         return self._text
 
+    def _size(self) -> list[str]:
+        """What the representation says beside the error."""
+        return []
+
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.to_dict()['schema']}>"
+        try:
+            said = [f"error {f'{100.0 * self.error:#.3g}'.rstrip('.')} %", *self._size()]
+        except (AttributeError, KeyError):
+            said = self._size() or [self.to_dict()["schema"]]
+        return f"{type(self).__name__}({', '.join(said)})"
 
 
-class Fit(Result):
-    """A fit with its model."""
+@dataclass(frozen=True)
+class Rows:
+    """Rows of logs with their torques, (N, n) each and ``t`` (N,); a joint's rows in motion are ``moving[:, j]``."""
 
-    def __init__(self, document: str, page: str, text: str, model: Model, full: Callable[[], str] | None = None):
+    #: Time [s].
+    t: Array
+    #: Positions [m or rad] and velocities [m/s or rad/s].
+    q: Array
+    v: Array
+    #: Torque as logged and as the model gives it [N or N m].
+    torque: Array
+    reconstructed: Array
+    #: Half the width of the 95 % band [N or N m]; 0 where the model holds none.
+    half_width: Array
+    #: Whether the joint moves.
+    moving: Any
+
+    @property
+    def residual(self) -> Array:
+        """Measured less reconstructed torque [N or N m]."""
+        return self.torque - self.reconstructed
+
+    def __repr__(self) -> str:
+        return f"Rows({len(self.t)} of {self.q.shape[1]} joints)"
+
+
+class ModelResult(Result):
+    """A result of a model on logs."""
+
+    def __init__(self, document: str, page: str | None, text: str, model: Model, full: Callable[[], str | None] | None,
+                 logs: list[Any]):
         super().__init__(document, page, text, full)
         self.model = model
+        self._logs = logs
+
+    def rows(self) -> Rows:
+        """Measured and reconstructed torque of every row of the logs, as arrays."""
+        from . import rows
+
+        return rows(self.model, self._logs)
+
+
+class Validation(ModelResult):
+    """Errors of a model on logs."""
+
+    def _size(self) -> list[str]:
+        return [f"{len(self.errors['joint'])} joints"]
+
+
+class Fit(ModelResult):
+    """A fit with its model."""
+
+    def _size(self) -> list[str]:
+        return [f"{len(self.model._native.parameters)} parameters"]
 
     @property
     def parameters(self) -> Any:
@@ -97,6 +174,9 @@ class Identification(Result):
         self.model = model
         self.folder = folder
 
+    def _size(self) -> list[str]:
+        return [f"{len(self.model._native.parameters)} parameters"]
+
     @property
     def parameters(self) -> Any:
         """A pandas frame of the model's parameters."""
@@ -107,7 +187,7 @@ class Diagnosis(Result):
     """A diagnosis; ``model`` is refined, or ``None`` where the data are at fault."""
 
     def __init__(self, document: str, page: str | None, text: str, model: Model | None,
-                 full: Callable[[], str] | None = None):
+                 full: Callable[[], str | None] | None = None):
         super().__init__(document, page, text, full)
         self.model = model
 

@@ -1,7 +1,7 @@
 //! Robots, logs, models and reduced logs as Python holds them.
 
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{self, GivenModel, ReducedLogs, RobotSetup, is_reduced};
@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::errors::{UsageError, of_input, of_stage};
+use crate::numbers::ModelNumbers;
 
 /// A robot file.
 #[pyclass(frozen, module = "cft_ident._native")]
@@ -27,10 +28,11 @@ impl Robot {
         Ok(Robot { machine })
     }
 
-    /// From TOML text; `name` stands for it in messages.
+    /// From TOML text; `name` stands for it in messages, and a URDF that the text names is looked for in `folder`.
     #[staticmethod]
-    fn parse(text: &str, name: &str) -> PyResult<Self> {
-        let file = RobotFile::parse(name, text).map_err(of_input)?;
+    #[pyo3(signature = (text, name, folder=None))]
+    fn parse(text: &str, name: &str, folder: Option<PathBuf>) -> PyResult<Self> {
+        let file = RobotFile::parse_in(name, text, folder.as_deref()).map_err(of_input)?;
         Ok(Robot {
             machine: RobotSetup::new(name, file),
         })
@@ -39,6 +41,12 @@ impl Robot {
     #[getter]
     fn name(&self) -> &str {
         &self.machine.name
+    }
+
+    /// The robot file as TOML, with the links and limits of its URDF in it.
+    #[getter]
+    fn text(&self) -> PyResult<String> {
+        self.machine.file.to_toml().map_err(of_input)
     }
 
     #[getter]
@@ -135,15 +143,30 @@ impl Log {
 pub struct Model {
     pub given: GivenModel,
     pub text: String,
+    numbers: OnceLock<ModelNumbers>,
 }
 
 impl Model {
     pub fn of(name: &str, file: ModelFile) -> PyResult<Self> {
         let text = file.to_toml().map_err(of_input)?;
-        Ok(Model {
-            given: GivenModel::new(name, file),
+        Ok(Model::new(GivenModel::new(name, file), text))
+    }
+
+    fn new(given: GivenModel, text: String) -> Self {
+        Model {
+            given,
             text,
-        })
+            numbers: OnceLock::new(),
+        }
+    }
+
+    /// What the model computes with, made at the first call.
+    pub fn numbers(&self) -> PyResult<&ModelNumbers> {
+        if let Some(numbers) = self.numbers.get() {
+            return Ok(numbers);
+        }
+        let made = ModelNumbers::new(self)?;
+        Ok(self.numbers.get_or_init(|| made))
     }
 
     pub fn provenance(&self) -> Provenance {
@@ -157,19 +180,13 @@ impl Model {
     fn load(path: &str) -> PyResult<Self> {
         let text = cft_ident::config::text(Path::new(path)).map_err(of_input)?;
         let file = ModelFile::parse_in(path, &text, Path::new(path).parent()).map_err(of_input)?;
-        Ok(Model {
-            given: GivenModel::new(path, file),
-            text: text.to_string(),
-        })
+        Ok(Model::new(GivenModel::new(path, file), text.to_string()))
     }
 
     #[staticmethod]
     fn parse(text: &str, name: &str) -> PyResult<Self> {
         let file = ModelFile::parse(name, text).map_err(of_input)?;
-        Ok(Model {
-            given: GivenModel::new(name, file),
-            text: text.to_owned(),
-        })
+        Ok(Model::new(GivenModel::new(name, file), text.to_owned()))
     }
 
     #[getter]

@@ -8,12 +8,14 @@ use cft_ident::cli;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
     self, AcceptedSetup, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings,
-    IdentifyError, LsqSettings, ReducedLogs, RobotSetup, RobotSources, SetupRefusal, TrackSource,
-    ValidateSettings, accepted_setup,
+    IdentifyError, LogData, LsqSettings, ReducedLogs, RobotSetup, RobotSources, SetupRefusal,
+    TrackSource, ValidateSettings, accepted_setup,
 };
+use cft_ident::number;
 use cft_ident::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident::report::{Report, stages};
-use cft_ident::setup::Finding;
+use cft_ident::setup::{ChannelKind, Finding, FindingKind, Setting};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::data::{Log, Model, Part, Robot};
@@ -36,13 +38,53 @@ fn accepted(data: Dataset, control: &Control) -> PyResult<AcceptedSetup> {
     accepted_setup(data, control).map_err(|refusal| match refusal {
         SetupRefusal::Interrupted => of_stage(IdentifyError::Interrupted),
         SetupRefusal::Contradicted(found) => {
-            let first = found.report.refusals().next();
+            let setup = &found.data.setup;
+            let mut logs = found.data.logs.iter().map(LogData::source);
+            let arrays = logs.all(|log| matches!(log, identify::Log::Arrays(_)));
+            let said = found.report.refusals().next().map(|first| {
+                let remedy = arrays.then(|| array_remedy(first, setup.robot.joint_names()));
+                match remedy.flatten() {
+                    Some(remedy) => format!("{}; {remedy}", first.meaning),
+                    None => first.in_words(),
+                }
+            });
             InputError::new_err(format!(
-                "{}: the torques contradict the robot file: {}; or go on without by as_declared=True",
-                found.data.setup.name,
-                first.map(Finding::in_words).unwrap_or_default()
+                "{}: the torques contradict the set-up: {}; or go on without by as_declared=True",
+                setup.name,
+                said.unwrap_or_default()
             ))
         }
+    })
+}
+
+/// What to do with arrays, where a robot file would get a line.
+fn array_remedy(finding: &Finding, joints: &[String]) -> Option<String> {
+    let array = match finding.channel? {
+        ChannelKind::Position => "q",
+        ChannelKind::Torque => "tau",
+        ChannelKind::Both => return None,
+    };
+    let place =
+        |joint: &Option<String>| joints.iter().position(|name| Some(name) == joint.as_ref());
+    let columns = match place(&finding.joint) {
+        Some(j) => format!("{array}[:, {j}]"),
+        None => array.to_owned(),
+    };
+    Some(match (finding.kind, &finding.found) {
+        (FindingKind::Sign | FindingKind::Scale, Setting::Number(x)) => {
+            match (x.to_degrees() - 1.0).abs() < 1e-9 {
+                true => format!("give radians: numpy.radians({columns})"),
+                false => format!("give {columns} times {}", number::significant(*x, 6)),
+            }
+        }
+        (FindingKind::Zero, Setting::Number(x)) => {
+            format!("give {columns} plus {}", number::significant(*x, 6))
+        }
+        (FindingKind::Order, _) => {
+            let other = place(&finding.with)?;
+            format!("exchange {columns} with {array}[:, {other}]")
+        }
+        _ => return None,
     })
 }
 
@@ -214,6 +256,62 @@ pub fn validate(
         });
         Ok(shown(&document.map_err(of_input)?, &report))
     })
+}
+
+/// Rows of logs: times, positions, velocities, torques as logged and as reconstructed, half widths of the band, movement.
+type RowArrays<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<bool>>,
+);
+
+/// Measured and reconstructed torque of every row of logs.
+#[pyfunction]
+pub fn rows<'py>(
+    py: Python<'py>,
+    model: PyRef<'py, Model>,
+    logs: Vec<PyRef<'py, Log>>,
+) -> PyResult<RowArrays<'py>> {
+    let (given, logs) = (model.given.clone(), all(&logs));
+    let n = given.file.robot.joint_names().len();
+    let (t, [q, v, measured, reconstructed, half_width], moving) =
+        work::run(py, move |control, _| {
+            let data = Dataset::read(&given.setup(), &logs, control).map_err(of_stage)?;
+            let (mut t, mut moving, mut columns) =
+                (Vec::new(), Vec::new(), [const { Vec::new() }; 5]);
+            let settings = ValidateSettings::of(&given);
+            let found = identify::validate(&data, &settings, control, &mut |row, _| {
+                t.push(row.t);
+                moving.extend(row.moving.iter().map(|x| *x > 0.0));
+                let each = [
+                    row.q,
+                    row.v,
+                    row.measured,
+                    row.reconstructed,
+                    row.half_width,
+                ];
+                for (column, row) in columns.iter_mut().zip(each) {
+                    column.extend_from_slice(row);
+                }
+            });
+            found.map_err(of_stage)?;
+            Ok((t, columns, moving))
+        })?;
+    let shape = [t.len(), n];
+    let matrix = |values: Vec<f64>| PyArray1::from_vec(py, values).reshape(shape);
+    Ok((
+        PyArray1::from_vec(py, t),
+        matrix(q)?,
+        matrix(v)?,
+        matrix(measured)?,
+        matrix(reconstructed)?,
+        matrix(half_width)?,
+        PyArray1::from_vec(py, moving).reshape(shape)?,
+    ))
 }
 
 /// Effects that a model lacks, and the refined model where there is one.

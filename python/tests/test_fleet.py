@@ -7,7 +7,7 @@ import time
 import cft_ident as ci
 import numpy as np
 import pytest
-from cft_ident.fleet import merge_bytes, reduce_dask, reduce_one, tree
+from cft_ident.fleet import merge_bytes, reduce_dask, reduce_one, texts, tree
 from conftest import SLIDE
 
 
@@ -67,6 +67,32 @@ def test_dask_gives_the_same_bytes_with_a_worker_killed_and_a_bad_log_told(logs,
 def slow_kill(pid):
     time.sleep(0.05)
     os.kill(pid, signal.SIGKILL)
+
+
+def test_a_robot_file_with_a_urdf_is_one_text_and_the_key_holds_the_urdf(tmp_path):
+    ci.example("ur10", tmp_path / "ur10")
+    log = str(tmp_path / "ur10/ur10.csv")
+    urdf = tmp_path / "ur10/ur10.urdf"
+    robot = ci.new(tmp_path / "arm", urdf=urdf, log=log).path
+    text, _ = texts(robot, None)
+    row = reduce_one(log, text, None, None)
+    assert row["part"] == ci.reduce(robot, log).to_bytes()
+    assert texts(ci.Robot.load(robot), None)[0] == text
+    assert texts("configs/ur10.toml", None)[0]
+    before = urdf.read_text()
+    urdf.write_text(before.replace("0.1273", "0.1274"))
+    assert before != urdf.read_text()
+    assert reduce_one(log, texts(robot, None)[0], None, None)["key"] != row["key"]
+
+
+def test_a_robot_that_cannot_be_read_and_logs_that_all_fail_are_one_error(logs, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with pytest.raises(ci.InputError, match="none.toml"):
+        reduce_dask(None, logs, tmp_path / "none.toml")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
+        with distributed.Client(cluster) as client:
+            with pytest.raises(ci.InputError, match="none of 1 logs can be reduced; .*bad.csv"):
+                reduce_dask(client, [str(tmp_path / "bad.csv")], tmp_path / "robot.toml")
 
 
 def test_ray_gives_the_same_bytes_and_tells_a_bad_log(logs, tmp_path):

@@ -1,6 +1,12 @@
 """Models compute with arrays: torques, their parts and their derivatives belong together."""
 
+import copy
+import ctypes
 import pathlib
+import pickle
+import re
+import shutil
+import subprocess
 
 import cft_ident as ci
 import numpy as np
@@ -55,9 +61,84 @@ def test_the_covariance_is_named_as_the_parameters_and_has_their_deviations(mode
             assert np.isclose(np.sqrt(covariance.loc[name, name]), std, rtol=1e-6)
 
 
-def test_arrays_of_another_robot_are_refused(model):
-    with pytest.raises(ci.UsageError, match="6 joints"):
-        model.torque(np.zeros((3, 5)), np.zeros((3, 5)), np.zeros((3, 5)))
+def test_arrays_that_do_not_belong_are_refused_by_name(model):
+    q, v, a = motion(3, 6)
+    with pytest.raises(ci.UsageError, match=re.escape("q has shape (3, 5)") + ".*q1, q2, q3, q4, q5, q6"):
+        model.torque(q[:, :5], v[:, :5], a[:, :5])
+    with pytest.raises(ci.UsageError, match=re.escape("v has shape (2, 6), and q (3, 6)")):
+        model.torque(q, v[:2], a)
+    with pytest.raises(ci.UsageError, match=re.escape("a has shape (6,), and q (3, 6)")):
+        model.load_torque(q, v, a[0])
+    a[1, 4] = np.nan
+    with pytest.raises(ci.UsageError, match="a is NaN in row 1, joint q5"):
+        model.torque(q, v, a)
+    with pytest.raises(ci.UsageError, match="takes one sample"):
+        model.start(q[0]).step(0.001, q, v, v)
+    with pytest.raises(ci.UsageError, match="dt is 0"):
+        model.start(q[0]).step(0.0, q[0], v[0], v[0])
+
+
+@pytest.fixture(scope="module")
+def remembering(model):
+    """The model with an effect at every joint that remembers the motion."""
+    effect = """[[effect]]
+name = "presliding"
+joint = "{}"
+[effect.parameters]
+sigma0 = {{ value = 600.0 }}
+sigma1 = {{ value = 1.0 }}
+fc = {{ value = 0.5 }}
+
+"""
+    head, rest = model.text.split("[provenance]")
+    return ci.Model.parse(head + "".join(map(effect.format, model.joints)) + "[provenance]" + rest)
+
+
+def wave(count=400, joints=6, dt=0.002):
+    t = dt * np.arange(count)[:, None]
+    w, phase = 3.0 + np.arange(joints), 0.3 * np.arange(joints)
+    return 0.4 * np.sin(w * t + phase), 0.4 * w * np.cos(w * t + phase), -0.4 * w**2 * np.sin(w * t + phase), dt
+
+
+def test_steps_are_the_rows_of_whole_motions(model, remembering):
+    q, v, a, dt = wave()
+    with pytest.raises(ci.UsageError, match="remember the motion.*model.start"):
+        remembering.torque(q, v, a)
+    for of in (model, remembering):
+        state = of.start(q[0])
+        steps = np.array([state.step(dt, *row) for row in zip(q, v, a)])
+        assert np.isclose(state.t, dt * len(q))
+        assert np.allclose(steps, of.torque(q, v, a, dt=dt), atol=1e-9)
+
+
+def test_steps_are_those_of_exported_c(remembering, tmp_path):
+    if shutil.which("cc") is None:
+        pytest.skip("there is no C compiler `cc`")
+    remembering.to_c(tmp_path / "arm.h")
+    (tmp_path / "arm.c").write_text("""#include "arm.h"
+static arm_state state;
+void start(const double *q) { arm_init(&state, q); }
+void step(double dt, const double *q, const double *v, const double *a, double *tau) { arm_step(&state, dt, q, v, a, tau); }
+""")
+    subprocess.run(["cc", "-shared", "-fPIC", "-O1", "arm.c", "-o", "arm.so", "-lm"], cwd=tmp_path, check=True)
+    code = ctypes.CDLL(str(tmp_path / "arm.so"))
+    pointer = lambda x: x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+    q, v, a, dt = wave()
+    code.start(pointer(q[0]))
+    state, theirs = remembering.start(q[0]), np.zeros(6)
+    for row in zip(q, v, a):
+        code.step(ctypes.c_double(dt), *map(pointer, row), pointer(theirs))
+        assert np.allclose(state.step(dt, *row), theirs, atol=1e-9)
+
+
+def test_models_robots_and_logs_are_pickled_and_copied(model, slide, slide_robot):
+    q, v, a = motion(4, 6)
+    for again in (pickle.loads(pickle.dumps(model)), copy.copy(model), copy.deepcopy(model)):
+        assert again.text == model.text and np.array_equal(again.torque(q, v, a), model.torque(q, v, a))
+    robot = pickle.loads(pickle.dumps(slide_robot))
+    log = copy.deepcopy(ci.Log.arrays(*slide(3), name="monday"))
+    assert log.name == "monday" and robot.name == "slide.toml"
+    assert ci.lsq(robot, log).json == ci.lsq(slide_robot, ci.Log.arrays(*slide(3), name="monday")).json
 
 
 def test_a_model_is_written_for_other_programs(model, tmp_path):

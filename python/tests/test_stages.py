@@ -1,7 +1,9 @@
 """The package gives the numbers of the command line, bit for bit, and its errors as exceptions."""
 
+import copy
 import os
 import pickle
+import re
 import signal
 import threading
 import time
@@ -38,6 +40,82 @@ def test_a_fit_and_its_validation_are_those_of_the_command_line(measured, tool, 
     frame = fit.parameters
     assert list(frame.columns) == ["parameter", "joint", "value", "std", "in_use", "unit"]
     assert len(frame) == len(ours["parameters"])
+
+
+def test_errors_are_the_numbers_that_are_printed(measured, tmp_path):
+    log = measured("ur10/ur10_exciting.csv")
+    fit = ci.lsq("configs/ur10.toml", log + "@0..70%")
+    judged = ci.validate(fit.model, log + "@70..100%")
+    found = ci.diagnose(fit.model, log + "@0..70%", holdout=log + "@70..100%")
+    for result in (fit, judged, found):
+        printed = re.search(r"error ([\d.]+) %", repr(result)).group(1)
+        assert f"{printed} %" in str(result).splitlines()[0], (repr(result), str(result)[:200])
+    assert repr(fit).endswith("58 parameters)") and repr(judged).endswith("6 joints)")
+    moving = [joint["relative_error_moving"] for joint in fit.to_dict()["joints"]]
+    assert np.array_equal(fit.errors["error"], moving)
+    assert (fit.errors["error_all_rows"] > fit.errors["error"]).any()
+    assert set(found.errors) == {"joint", "before", "before_all_rows", "after", "after_all_rows"}
+
+
+def test_rows_give_the_errors_again(measured):
+    log = measured("ur10/ur10_exciting.csv")
+    fit = ci.lsq("configs/ur10.toml", log + "@0..70%")
+    judged = ci.validate(fit.model, log + "@70..100%")
+    rows = judged.rows()
+    assert rows.q.shape == rows.v.shape == rows.torque.shape == rows.moving.shape == (len(rows.t), 6)
+    raw = np.sqrt((rows.residual**2).sum(axis=0) / (rows.torque**2).sum(axis=0))
+    assert np.allclose(raw, [joint["relative_error_raw"] for joint in judged.to_dict()["joints"]])
+    assert rows.moving.any(axis=0).all() and not rows.moving.all()
+    assert np.abs(rows.v[~rows.moving]).max() < np.abs(rows.v).max() / 10
+
+
+def test_results_are_pickled_and_copied_with_their_pages(slide, slide_robot):
+    fit = ci.lsq(slide_robot, ci.Log.arrays(*slide(3)))
+    again = pickle.loads(pickle.dumps(fit))
+    assert repr(copy.deepcopy(again)) == repr(fit)
+    assert again.html == fit.html and "<svg" in fit.html
+
+
+def test_a_robot_of_a_urdf_is_that_of_new(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ci.example("ur10", "ur10")
+    urdf, log = "ur10/ur10.urdf", "ur10/ur10.csv@0..70%"
+    made = ci.new("arm", urdf=urdf, log=log)
+    theirs = ci.lsq(made.path, log)
+    for robot in (ci.Robot.from_urdf(urdf), ci.Robot.from_urdf(urdf, log=log)):
+        ours = ci.lsq(robot, log)
+        assert ours.to_dict()["parameters"] == theirs.to_dict()["parameters"]
+        assert len(ours.html) > 0.9 * len(theirs.html)
+    kept = ci.lsq(ci.Robot.from_urdf(urdf, cutoff_hz=7.5), log)
+    assert kept.to_dict()["processing"]["cutoff_hz"] == 7.5 != ours.to_dict()["processing"]["cutoff_hz"]
+    # the same of arrays, and everything after it
+    rows = theirs.rows()
+    arrays = ci.Log.arrays(rows.t, rows.q, rows.torque)
+    fit = ci.lsq(ci.Robot.from_urdf(urdf), arrays)
+    assert fit.to_dict()["processing"]["cutoff_hz"] == ours.to_dict()["processing"]["cutoff_hz"]
+    found = ci.identify(urdf, arrays, "run")
+    assert len(found.errors["error"]) == 6 and found.html == (tmp_path / "run/report.html").read_text()
+    assert repr(found).startswith("Identification(error ")
+    assert ci.watch(found.model, arrays, "external.csv", false_alarms=2.0).to_dict()
+
+
+def test_arguments_in_the_wrong_place_are_refused_by_name(slide, slide_robot):
+    t, q, tau = slide(3)
+    with pytest.raises(ci.UsageError, match="t runs backwards.*order is t, q, tau"):
+        ci.Log.arrays(q, t, tau)
+    with pytest.raises(ci.UsageError, match="tau has shape"):
+        ci.Log.arrays(t, q, tau[:-1])
+    with pytest.raises(ci.UsageError, match="q is nan in row 4, column 0"):
+        ci.Log.arrays(t, np.where(np.arange(len(t)) == 4, np.nan, q), tau)
+    log = ci.Log.arrays(t, q, tau)
+    with pytest.raises(ci.UsageError, match="a log is asked for.*Robot.*robot or model first"):
+        ci.lsq(log, slide_robot)
+    with pytest.raises(ci.UsageError, match="a robot or the path of its file is asked for first"):
+        ci.lsq(log, log)
+    with pytest.raises(ci.UsageError, match="a log is asked for.*configs/ur10.toml"):
+        ci.lsq(slide_robot, "configs/ur10.toml")
+    with pytest.raises(ci.UsageError, match="a log is asked for.*Model.*robot or model first"):
+        ci.validate(log, ci.lsq(slide_robot, log).model)
 
 
 def test_reduced_logs_are_those_of_the_command_line(measured, tool, tmp_path):

@@ -122,6 +122,8 @@ pub struct ReconstructedRow<'a> {
     /// Unfiltered torque as logged and as reconstructed, n numbers each.
     pub measured: &'a [f64],
     pub reconstructed: &'a [f64],
+    /// Movement of each joint: 1 in motion, 0 at rest or at a reversal.
+    pub moving: &'a [f64],
     /// Half the width of the 95 % band; 0 without one.
     pub half_width: &'a [f64],
 }
@@ -372,6 +374,7 @@ impl<'a> TorqueReconstruction<'a> {
             v,
             measured: &raw[..n],
             reconstructed: &raw[n..2 * n],
+            moving: &raw[2 * n..3 * n],
             half_width: &raw[3 * n..4 * n],
         });
         if keep {

@@ -1,7 +1,7 @@
 """Many logs on engines that exist: reduce each where a worker is free, merge in a tree, fit the result.
 
-``reduce_dask`` and ``reduce_ray`` share what is here. Work is known by the SHA-256 of the log, the robot file, the
-friction model and the version: what lies in the store is not done again. A bad log is a row of the table of
+``reduce_dask`` and ``reduce_ray`` share what is here. A robot travels as one text, the links of its URDF in it. Work is
+known by the SHA-256 of the log, that text, the friction model and the version: what lies in the store is not done again. A bad log is a row of the table of
 failures, not the end. Parts are merged in the order of their hashes, in a tree that depends on nothing else, so
 that the result has the same bytes however the work was shared.
 """
@@ -11,11 +11,11 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .. import CftIdentError, Model, Part, Robot, __version__, merge, reduce
+from .. import CftIdentError, InputError, Model, Part, PathLike, Robot, __version__, merge, reduce
 
 __all__ = ["Fleet", "reduce_dask", "reduce_one", "reduce_ray", "tree"]
 
@@ -76,12 +76,14 @@ def merge_bytes(parts: list[bytes]) -> bytes:
     return merge([Part.from_bytes(part) for part in parts]).to_bytes()
 
 
-def text_of(path: str | os.PathLike[str] | None) -> str | None:
-    """Text of a robot or model file, which travels to the workers."""
-    if path is None:
-        return None
-    with open(path, encoding="utf-8") as file:
-        return file.read()
+def texts(robot: Robot | PathLike, model: Model | PathLike | None, urls: Sequence[str] = ()) -> tuple[str, str | None]:
+    """Robot and friction model as the texts that travel to the workers; what is wrong with either is raised here, once."""
+    robot = robot if isinstance(robot, Robot) else Robot.load(robot)
+    if model is not None and not isinstance(model, Model):
+        model = Model.load(model)
+    # a robot of a URDF takes columns and cut-off from the first log that is at hand
+    here = [url for url in urls if "://" not in url]
+    return robot._for(here).text, None if model is None else model.text
 
 
 def _local(url: str, folder: str) -> tuple[str, str]:
@@ -113,7 +115,10 @@ def _write(path: str, data: bytes) -> None:
 
 
 def _sorted_out(found: Iterable[dict[str, Any]]) -> tuple[dict[str, Any], list[dict[str, str]], int]:
-    """Parts by their key, failures by their URL, and how many were reused; a log that is given twice counts once."""
+    """Parts by their key, failures by their URL, and how many were reused; a log that is given twice counts once.
+
+    Where no log can be reduced, that is an error, with the reason of the first.
+    """
     parts, failures, reused = {}, [], 0
     for row in sorted(found, key=lambda row: row["url"]):
         if "error" in row:
@@ -123,6 +128,9 @@ def _sorted_out(found: Iterable[dict[str, Any]]) -> tuple[dict[str, Any], list[d
         else:
             parts[row["key"]] = row["part"]
             reused += bool(row["reused"])
+    if failures and not parts:
+        first = failures[0]
+        raise InputError(f"none of {len(failures)} logs can be reduced; {first['url']}: {first['error']}")
     return parts, failures, reused
 
 

@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .. import Model, PathLike, Robot
     from . import Fleet
 
 
-def reduce_ray(urls: Iterable[str], robot: str, *, model: str | None = None, store: str | None = None,
-               as_declared: bool = False) -> Fleet:
+def reduce_ray(urls: Iterable[str], robot: Robot | PathLike, *, model: Model | PathLike | None = None,
+               store: str | None = None, as_declared: bool = False) -> Fleet:
     """Reduce logs where Ray has room, and merge them in a tree; arguments as of :func:`reduce_dask`.
 
     Ray runs a lost worker's tasks again by itself.
@@ -18,11 +19,12 @@ def reduce_ray(urls: Iterable[str], robot: str, *, model: str | None = None, sto
     import ray
 
     from .. import Part
-    from . import Fleet, _sorted_out, merge_bytes, reduce_one, text_of, tree
+    from . import Fleet, _sorted_out, merge_bytes, reduce_one, texts, tree
 
-    texts = (text_of(robot) or "", text_of(model))
+    urls = list(urls)
+    both = texts(robot, model, urls)
     rows = ray.data.from_items([{"url": url} for url in urls])
-    found = rows.map(lambda row: _whole(reduce_one(row["url"], *texts, store, as_declared))).take_all()
+    found = rows.map(lambda row: _whole(reduce_one(row["url"], *both, store, as_declared))).take_all()
     found = [{key: value for key, value in row.items() if value is not None} for row in found]
     parts, failures, reused = _sorted_out(found)
     join = ray.remote(lambda *some: merge_bytes(list(some)))

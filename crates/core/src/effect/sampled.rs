@@ -53,6 +53,11 @@ impl SampledModel {
         &self.model
     }
 
+    /// Takes `dt` seconds as the time since the sample before, for the samples from here on.
+    pub fn set_interval(&mut self, dt: f64) {
+        self.stretch.dt = dt;
+    }
+
     /// Says that the next sample begins a stretch.
     pub fn begin(&mut self) {
         self.kept.iter_mut().for_each(|kept| kept.fill(f64::NAN));

@@ -69,6 +69,8 @@ fn read(block: &Block) -> (TorqueErrors, usize, Vec<f64>) {
     let summary = all.add(&settings(), &mut once(block), &mut |r| {
         assert_eq!((r.q.len(), r.measured.len(), r.half_width.len()), (2, 2, 2));
         rows += 1;
+        let fast = [0, 1].map(|j| r.v[j].abs() > RESTS[j]);
+        assert_eq!([0, 1].map(|j| r.moving[j] > 0.0), fast, "row {rows}");
     });
     let found = all.finish(summary.expect("a log that can be filtered"));
     assert_eq!(found.summary.decimation, 3);

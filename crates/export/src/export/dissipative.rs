@@ -83,6 +83,13 @@ pub(super) fn friction_at(
     of_friction: &[usize],
     v: Vec<Vec<f64>>,
 ) -> Vec<Vec<f64>> {
+    let law = |(law, speeds): (&JointFriction, &Vec<f64>)| -> Vec<f64> {
+        speeds.iter().map(|v| law.torque(*v)).collect()
+    };
+    let laws = &refined.model.friction;
+    if of_friction.is_empty() {
+        return laws.iter().zip(&v).map(law).collect();
+    }
     let rows = v.first().map_or(0, Vec::len);
     let rest = || vec![vec![0.0; rows]; v.len()];
     let along = Stretch {
@@ -97,9 +104,8 @@ pub(super) fn friction_at(
     let torques = refined.torques(&along);
     let scene = scene(&refined.model, &along, &torques);
     let mut of_effect = vec![0.0; rows];
-    let each = refined.model.friction.iter().zip(&along.v).enumerate();
-    each.map(|(j, (law, speeds))| {
-        let mut friction: Vec<f64> = speeds.iter().map(|v| law.torque(*v)).collect();
+    let each = laws.iter().zip(&along.v).map(law).enumerate();
+    each.map(|(j, mut friction)| {
         for effect in of_friction.iter().filter_map(|i| refined.effects.get(*i)) {
             effect.torque(&scene, j, &mut of_effect);
             for (sum, x) in friction.iter_mut().zip(&of_effect) {
@@ -129,26 +135,39 @@ pub(super) fn scene<'a>(
     }
 }
 
-/// Friction of each joint at its speeds `v`, joint by joint and as many of each, as exported code has it: the law with
-/// the effects of the speed alone, and none where it would drive.
-///
-/// # Errors
-/// An effect that has no code.
-pub fn joint_friction(
-    refined: &AugmentedModel,
-    v: Vec<Vec<f64>>,
-) -> Result<Vec<Vec<f64>>, ExportError> {
-    let of_friction = EffectsCode::of(refined)?.of_friction;
-    let drives = driving(refined, &of_friction);
-    let mut out = friction_at(refined, &of_friction, v.clone());
-    for ((friction, v), drives) in out.iter_mut().zip(&v).zip(&drives) {
-        if drives.is_some() {
+/// Friction of each joint as exported code has it: the law with the effects of the speed alone, and none where it would
+/// drive.
+#[derive(Debug, Clone)]
+pub struct DissipativeFriction {
+    of_friction: Vec<usize>,
+    /// Joints whose friction would drive at some speed.
+    drives: Vec<bool>,
+}
+
+impl DissipativeFriction {
+    /// That of a model.
+    ///
+    /// # Errors
+    /// An effect that has no code.
+    pub fn new(refined: &AugmentedModel) -> Result<Self, ExportError> {
+        let of_friction = EffectsCode::of(refined)?.of_friction;
+        let drives = driving(refined, &of_friction);
+        Ok(Self {
+            drives: drives.iter().map(Option::is_some).collect(),
+            of_friction,
+        })
+    }
+
+    /// Friction of that model at speeds `v` \[N or Nm\], both `[joint][row]`.
+    pub fn torques(&self, refined: &AugmentedModel, v: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let mut out = friction_at(refined, &self.of_friction, v.clone());
+        for ((friction, v), _) in (out.iter_mut().zip(&v).zip(&self.drives)).filter(|x| *x.1) {
             for (x, v) in friction.iter_mut().zip(v) {
                 *x = if *x * v > 0.0 { *x } else { 0.0 };
             }
         }
+        out
     }
-    Ok(out)
 }
 
 /// Speeds from and to which the friction of each joint drives it, its effects among those of a speed alone included.

@@ -113,6 +113,18 @@ impl Covariance {
     }
 }
 
+impl RobotFile {
+    /// The robot file as TOML text that stands alone: the links and limits of its URDF are in it.
+    ///
+    /// # Errors
+    /// A content that TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String, ConfigError> {
+        let mut text = String::new();
+        put(&mut text, "", toml::to_string(self))?;
+        Ok(text)
+    }
+}
+
 impl ModelFile {
     /// Reads a model from TOML text; `file` names it in errors.
     ///

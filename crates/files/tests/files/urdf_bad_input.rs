@@ -313,7 +313,7 @@ fn read(text: &str, folder: &Path) -> bool {
     let mut y = vec![0.0; n * p];
     robot.regressor(&vec![0.1; n], &vec![0.2; n], &vec![0.3; n], &mut y);
     // without the URDF the file is the same robot
-    let again = toml::to_string(&file).unwrap();
+    let again = file.to_toml().unwrap();
     assert_eq!(RobotFile::parse("r.toml", &again).unwrap(), file);
     true
 }
