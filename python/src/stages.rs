@@ -39,7 +39,7 @@ fn accepted(data: Dataset, control: &Control) -> PyResult<AcceptedSetup> {
         SetupRefusal::Interrupted => of_stage(IdentifyError::Interrupted),
         SetupRefusal::Contradicted(found) => {
             let setup = &found.data.setup;
-            let mut logs = found.data.logs.iter().map(LogData::source);
+            let mut logs = found.data.logs.iter().map(|log| &log.source);
             let arrays = logs.all(|log| matches!(log, identify::Log::Arrays(_)));
             let said = found.report.refusals().next().map(|first| {
                 let remedy = arrays.then(|| array_remedy(first, setup.robot.joint_names()));
