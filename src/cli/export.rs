@@ -2,12 +2,14 @@
 
 mod drives;
 mod exported;
+mod formats;
 mod sources;
 mod tool;
 
 pub use self::exported::ExportedModel;
 use self::exported::{FormatOmission, WrittenFile};
-use self::sources::{not_of_others, source};
+use self::formats::formats;
+use self::sources::{SourceFile, folder_from, not_of_others, source, with_table};
 mod words;
 
 use cft_ident_core::explain::Explain;
@@ -15,18 +17,19 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use self::words::{about_effects, beyond_table, effects, never_driving, not_in_here};
+use super::files::ReadFile;
 use super::{
     CliError, Context, Outcome, arguments, controller, file_name, files, logs_of, paths_of,
 };
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::effect::as_code::no_torque;
 use cft_ident_export::export::arm::{Arm, ArmSettings, BaseFrame, FormatSupport};
+use cft_ident_export::export::checked::{self, FileToCheck};
 use cft_ident_export::export::dissipative::below_zero;
-use cft_ident_export::export::left_out::{self, OmissionPlace};
-use cft_ident_export::export::{self, ExportError, Note, Program, urdf, urdf_source};
-use cft_ident_files::config::{
-    self, ModelFile, UrdfReplacement, replaced_in_mjcf, replaced_in_urdf,
-};
+use cft_ident_export::export::left_out::{self, LeftOut, OmissionPlace};
+use cft_ident_export::export::source_text::{SourceText, WrittenSource};
+use cft_ident_export::export::{self, ExportError, Note, Program, mjcf_source, urdf, urdf_source};
+use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::table::{CellAlignment, Table};
@@ -161,41 +164,6 @@ fn stem(path: &Path) -> String {
     stem.to_string_lossy().into_owned()
 }
 
-/// A format of a simulator that is asked for.
-struct Format<'a> {
-    path: &'a Path,
-    what: &'static str,
-    /// The list beside it.
-    side: PathBuf,
-    says: FormatSupport,
-    text: FormatWriter,
-}
-
-/// The text of a format, of an arm and the lines at its head.
-type FormatWriter = fn(&Arm, &[String]) -> String;
-
-fn formats(args: &Args) -> Vec<Format<'_>> {
-    use export::{mjcf, sdf, usd};
-    let all: [(&Option<PathBuf>, &'static str, FormatSupport, FormatWriter); 3] = [
-        (&args.mjcf, "MJCF", mjcf::SAYS, mjcf::mjcf),
-        (&args.sdf, "SDF", sdf::SAYS, sdf::sdf),
-        (&args.usd, "USD", usd::SAYS, usd::usd),
-    ];
-    let asked = all.into_iter().filter_map(|(path, what, says, text)| {
-        let path = path.as_deref()?;
-        let mut side = path.as_os_str().to_owned();
-        side.push(".left-out.toml");
-        Some(Format {
-            path,
-            what,
-            side: side.into(),
-            says,
-            text,
-        })
-    });
-    asked.collect()
-}
-
 /// The motion along which sizes are taken, where logs are given.
 fn along(args: &Args, given: &GivenModel, context: &Context) -> Result<Option<InMemory>, CliError> {
     if args.logs.is_empty() {
@@ -328,8 +296,30 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             ..settings
         };
         let arm = Arm::of(&kept, &refined, arm).map_err(failed)?;
-        let beside =
-            (source.as_ref()).is_none_or(|source| urdf_source::same_names(&arm, &source.value.1));
+        let names = controller_names(&given.value.file);
+        let folder = args.urdf_source.as_deref();
+        let folder = folder.and_then(|source| folder_from(path, source));
+        let into = |head: &[String]| {
+            let write = |source: &ReadFile<(String, RobotFile)>| {
+                let (text, robot) = &source.value;
+                let into = SourceText {
+                    file: &source.name,
+                    text,
+                    names: &names,
+                    folder: folder.as_deref(),
+                };
+                urdf_source::written(&arm, &into, robot, head)
+            };
+            source.as_ref().map(write).transpose()
+        };
+        // a chain of the source that has the joints of the model, so that a model file can stand beside it
+        let draft = into(&[]).map_err(failed)?;
+        let chain = match &draft {
+            Some(draft) => urdf_source::tip_of(&arm, &draft.text),
+            None => Some(None),
+        };
+        let beside = chain.is_some();
+        kept.robot.robot.tip = chain.flatten();
         let elsewhere = match beside {
             true => OmissionPlace::Beside,
             false => OmissionPlace::Nowhere,
@@ -338,32 +328,41 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             armature_readers: urdf::SAYS.armature_readers.filter(|_| source.is_none()),
             ..urdf::SAYS
         };
-        let found = left_out::left_out(&arm, &refined, says, stretches);
-        let mut urdf_lines = base_lines.clone();
-        urdf_lines.extend(not_in_here(&left_out));
-        urdf_lines.extend(left_out::lines(&found, &logs, elsewhere));
-        let mut made =
-            urdf::urdf(&kept, model, &arm, &file_name(path), &urdf_lines).map_err(failed)?;
-        if let Some(source) = &source {
-            let (text, robot) = &source.value;
-            let names = controller_names(&given.value.file);
-            let replacement = urdf_source::replacement(&arm, robot, &source.name, &names);
-            let replacement = UrdfReplacement {
-                notes: urdf_lines,
-                ..replacement.map_err(failed)?
+        let written = |found: &[LeftOut]| {
+            let mut head = base_lines.clone();
+            head.extend(not_in_here(&left_out));
+            head.extend(left_out::lines(found, &logs, elsewhere));
+            let mut made = urdf::urdf(&kept, model, &arm, &file_name(path), &head)?;
+            let of_source = into(&head)?;
+            if let Some(of_source) = &of_source {
+                made.urdf.clone_from(&of_source.text);
+            }
+            Ok((made, of_source))
+        };
+        let shown = file_name(path);
+        let check = |(made, source): &(urdf::UrdfFiles, Option<WrittenSource>)| {
+            let file = FileToCheck {
+                file: &shown,
+                text: &made.urdf,
+                says,
+                source: source.as_ref(),
             };
-            made.urdf = replaced_in_urdf(&source.name, text, &replacement)?;
-        }
+            checked::urdf(&file, &arm, &refined, stretches)
+        };
+        let found = left_out::left_out(&arm, &refined, says, stretches);
+        let ((made, of_source), found) = with_table(found, written, check).map_err(failed)?;
         // what the model file beside it holds is no loss
         let lost = found.into_iter().filter(|part| !beside || part.of_reader);
         beyond.extend(lost.map(|part| FormatOmission::of(path, part)));
+        described.extend(of_source.into_iter().flat_map(|source| source.notes));
         texts.push((path, "URDF", made.urdf));
         if beside {
             texts.push((side, "model file of the URDF", made.side));
         } else {
             described.push(format!(
-                "{}: joints have other names there than in the model, so no model file stands beside {}",
+                "{}: no chain of it has the joints of the model ({}), so no model file stands beside {}",
                 source.as_ref().map_or("", |source| source.name.as_str()),
+                program.joints.join(", "),
                 file_name(path)
             ));
         }
@@ -387,18 +386,38 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             let mut head = base_lines.clone();
             head.extend(not_in_here(&left_out));
             head.extend(below_zero(&given.value.file, model));
-            let side = export::left_out::side_file(&found, &head, &logs).map_err(failed)?;
-            head.extend(left_out::lines(&found, &logs, OmissionPlace::Nowhere));
-            head.extend(arm.of_inertials.iter().cloned());
-            let text = match of_source {
-                None => (format.text)(&arm, &head),
-                Some(source) => {
-                    let names = controller_names(&given.value.file);
-                    let joints = export::mjcf::replacements(&arm, &names);
-                    let shown = escape(&source.to_string_lossy());
-                    replaced_in_mjcf(&shown, &config::text(source)?, &joints, &head)?
+            let source = of_source
+                .map(|source| SourceFile::mjcf(source, format.path))
+                .transpose()?;
+            let names = controller_names(&given.value.file);
+            let write = |found: &[LeftOut]| {
+                let mut head = head.clone();
+                head.extend(left_out::lines(found, &logs, OmissionPlace::Nowhere));
+                head.extend(arm.of_inertials.iter().cloned());
+                match &source {
+                    None => Ok(((format.text)(&arm, &head), None)),
+                    Some(source) => {
+                        let written = mjcf_source::written(&arm, &source.to_write(&names), &head)?;
+                        Ok((written.text.clone(), Some(written)))
+                    }
                 }
             };
+            let shown = file_name(format.path);
+            let check = |(text, source): &(String, Option<WrittenSource>)| {
+                let file = FileToCheck {
+                    file: &shown,
+                    text,
+                    says,
+                    source: source.as_ref(),
+                };
+                match args.mjcf.as_deref() == Some(format.path) {
+                    true => checked::mjcf(&file, &arm, &refined, stretches),
+                    false => Ok(Vec::new()),
+                }
+            };
+            let ((text, written), found) = with_table(found, write, check).map_err(failed)?;
+            let side = export::left_out::side_file(&found, &head, &logs).map_err(failed)?;
+            described.extend(written.into_iter().flat_map(|written| written.notes));
             texts.push((format.path, format.what, text));
             texts.push((&format.side, "what it cannot say", side));
             let found = found.into_iter();

@@ -1,6 +1,7 @@
 //! Exported models give the torques of the model: the C header as cc compiles it, the Rust module as
 //! rustc does, the URDF as it is read back.
 
+mod sources;
 mod urdf;
 mod world;
 

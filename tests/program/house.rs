@@ -20,7 +20,11 @@ const ROOMS: &[(&str, &str)] = &[
     ("output", "explain log"),
     ("motion", "explain math robot block"),
     ("effect", "explain math number robot motion"),
-    ("export", "explain number robot config motion effect"),
+    ("read_back", "config"),
+    (
+        "export",
+        "explain number robot config motion effect read_back",
+    ),
     ("band", "math number robot config motion effect"),
     (
         "observe",

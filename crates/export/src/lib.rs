@@ -21,3 +21,4 @@
 #![forbid(unsafe_code)]
 
 pub mod export;
+pub mod read_back;

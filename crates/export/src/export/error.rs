@@ -38,13 +38,19 @@ pub enum ExportError {
         remedy
     )]
     Impossible { link: String, remedy: &'static str },
-    /// The user's URDF is of another robot, or its frames are others.
+    /// The user's URDF or MJCF is of another robot, its frames are others, or it has parts that are not read.
     #[explain("{file}: {problem}", remedy)]
-    OtherUrdf {
+    OtherSource {
         file: String,
         problem: String,
-        remedy: &'static str,
+        remedy: String,
     },
+    /// The file that was to be written is another robot than the model.
+    #[explain(
+        "{file}, read back, is another robot than the model: {problem}",
+        "export with --c or --rust, and report it with the files"
+    )]
+    ReadBack { file: String, problem: String },
     /// The side file could not be written as text.
     #[explain(_0.explanation())]
     Config(#[from] ConfigError),

@@ -32,14 +32,14 @@ pub struct LeftOut {
 }
 
 /// A part of the model that a file cannot say, with the torque that it is worth.
-struct OmittedPart<'a> {
-    what: String,
-    of_reader: bool,
-    torque: Box<Torque<'a>>,
+pub(super) struct OmittedPart<'a> {
+    pub what: String,
+    pub of_reader: bool,
+    pub torque: Box<Torque<'a>>,
 }
 
 /// Torque of every joint along a stretch, by the model's there.
-type Torque<'a> = dyn Fn(&Stretch, &[Vec<f64>]) -> Vec<Vec<f64>> + 'a;
+pub(super) type Torque<'a> = dyn Fn(&Stretch, &[Vec<f64>]) -> Vec<Vec<f64>> + 'a;
 
 /// What a format cannot say, with its size along the stretches given, of which there may be none.
 pub fn left_out(
@@ -48,7 +48,15 @@ pub fn left_out(
     says: FormatSupport,
     stretches: &[Stretch],
 ) -> Vec<LeftOut> {
-    let parts = parts(arm, refined, says);
+    sized(parts(arm, refined, says), refined, stretches)
+}
+
+/// Parts of a model's torque with their sizes along stretches.
+pub(super) fn sized(
+    parts: Vec<OmittedPart>,
+    refined: &AugmentedModel,
+    stretches: &[Stretch],
+) -> Vec<LeftOut> {
     let n = refined.model.robot.joints();
     let mut whole = vec![0.0; n];
     let mut own = vec![vec![0.0; n]; parts.len()];
@@ -80,7 +88,7 @@ pub fn left_out(
     shown.collect()
 }
 
-fn parts<'a>(
+pub(super) fn parts<'a>(
     arm: &'a Arm,
     refined: &'a AugmentedModel,
     says: FormatSupport,

@@ -1,15 +1,13 @@
 //! MuJoCo's MJCF: bodies with inertials, joints with armature, damping, friction loss and ranges, gear trains
 //! of two joints as tendons, followers as equalities.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, quaternion};
+use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, OwnJoint, quaternion};
 use super::prepared::{in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::Body;
 use cft_ident_core::robot::tree::space::of_roll_pitch_yaw;
-use cft_ident_files::config::MjcfJoint;
 
 /// What MJCF can say.
 pub const SAYS: FormatSupport = FormatSupport {
@@ -51,7 +49,7 @@ pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
     }
     out.push_str("    </body>\n  </worldbody>\n");
     if let (Some(_), false) = (&own, arm.couplings.is_empty()) {
-        tendons(&mut out, arm);
+        tendons(&mut out, arm, &str::to_owned);
     }
     followers(&mut out, arm);
     out.push_str("  <actuator>\n");
@@ -66,34 +64,8 @@ pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
     out
 }
 
-/// What stands in the user's own MJCF, by the names that it has for the joints: geoms and meshes stay. `names` are those of
-/// joints that are called otherwise there.
-pub fn replacements(arm: &Arm, names: &BTreeMap<String, String>) -> BTreeMap<String, MjcfJoint> {
-    let own = arm.trains();
-    let of = |link: &ArmLink| {
-        let ArmJoint::Own(joint) = &link.joint else {
-            return None;
-        };
-        let whole = [joint.armature, joint.damping];
-        let [armature, damping] = own.as_ref().map_or(whole, |own| own[joint.index]);
-        let numbers = [
-            ("armature", armature),
-            ("damping", damping),
-            ("frictionloss", joint.friction),
-        ];
-        let name = names.get(&joint.name).unwrap_or(&joint.name);
-        let with = MjcfJoint {
-            inertial: inertial(&link.body),
-            attributes: numbers.map(|(key, x)| (key, format!("{x:?}"))).to_vec(),
-            origin: link.origin,
-        };
-        Some((name.clone(), with))
-    };
-    arm.links.iter().filter_map(of).collect()
-}
-
 /// The inertia of a body about its centre.
-fn inertial(body: &Body) -> String {
+pub(super) fn inertial(body: &Body) -> String {
     let [xx, xy, xz, yy, yz, zz] = body.inertia;
     format!(
         "<inertial pos=\"{}\" mass=\"{:?}\" fullinertia=\"{}\"/>",
@@ -155,29 +127,34 @@ fn joint(out: &mut String, link: &ArmLink, pad: &str, own: Option<&[[f64; 2]]>) 
         ArmJoint::Own(joint) => {
             let whole = [joint.armature, joint.damping];
             let [armature, damping] = own.map_or(whole, |own| own[joint.index]);
-            let bend = match joint.bend {
-                [0.0, 0.0] => String::new(),
-                bend => format!(" {}", words(&bend)),
-            };
             let range = joint.limits.position;
             let range = range.map_or(String::new(), |ends| format!(" range=\"{}\"", words(&ends)));
             let _ = writeln!(
                 out,
                 "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{axis}\" armature=\"{armature:?}\" \
-                 damping=\"{damping:?}{bend}\" frictionloss=\"{:?}\"{range}/>",
+                 damping=\"{}\" frictionloss=\"{:?}\"{range}/>",
                 quoted(&joint.name),
+                damping_of(joint, damping),
                 joint.friction
             );
         }
     }
 }
 
-/// Gear trains of two joints: what turns with v_motor + ratio v_other.
-fn tendons(out: &mut String, arm: &Arm) {
+/// The damping of a joint that has this much of its own, with what bends it where the model has that.
+pub(super) fn damping_of(joint: &OwnJoint, damping: f64) -> String {
+    match joint.bend {
+        [0.0, 0.0] => format!("{damping:?}"),
+        [bend, cube] => words(&[damping, bend, cube]),
+    }
+}
+
+/// Gear trains of two joints: what turns with v_motor + ratio v_other. Joints have the names that they are `called`.
+pub(super) fn tendons(out: &mut String, arm: &Arm, called: &dyn Fn(&str) -> String) {
     let joints = arm.joints();
     out.push_str("  <tendon>\n");
     for (c, [inertia, damping, friction]) in &arm.couplings {
-        let (motor, other) = (quoted(&joints[c.motor].name), quoted(&joints[c.other].name));
+        let [motor, other] = [c.motor, c.other].map(|j| quoted(&called(&joints[j].name)));
         let _ = write!(
             out,
             "    <fixed name=\"{motor}_{other}\" armature=\"{inertia:?}\" damping=\"{damping:?}\" \

@@ -19,9 +19,12 @@
 //! | [`mjcf`] [`sdf`] [`usd`] | MuJoCo, Gazebo, Isaac Sim |
 //! | [`ros2_control`] | gains of ros2_control by the inertia of each joint |
 //! | [`urdf`] | the URDF, and what it cannot hold beside it |
-//! | [`urdf_source`] | the user's own URDF with what was identified |
+//! | [`source_text`] `source_link` `text_edits` | a file of the user's, its links, changes of its text |
+//! | [`urdf_source`] [`mjcf_source`] | the user's own URDF or MJCF with what was identified |
+//! | [`checked`] | a file that is read back gives the torques of the model |
 
 pub mod arm;
+pub mod checked;
 mod code;
 pub mod dissipative;
 mod error;
@@ -29,6 +32,7 @@ mod functions;
 pub mod header;
 pub mod left_out;
 pub mod mjcf;
+pub mod mjcf_source;
 pub mod module;
 pub mod note;
 mod observer;
@@ -38,7 +42,10 @@ pub mod recipe;
 pub mod ros2_control;
 pub mod sdf;
 mod single;
+pub mod source_link;
+pub mod source_text;
 mod standard;
+mod text_edits;
 mod turned;
 pub mod urdf;
 pub mod urdf_source;

@@ -4,105 +4,282 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::arm::{Arm, ArmJoint, ArmLink};
 use super::error::ExportError;
-use super::prepared::{dynamics, inertial, words};
+use super::prepared::{dynamics, inertial};
+use super::source_link::{
+    NEGLIGIBLE, Pose, SourceLink, composed, difference, displaced, rest, seen_from, without,
+};
+use super::source_text::{SourceText, WrittenSource};
+use super::text_edits::TextEdits;
+use cft_ident_core::robot::standard::Body;
 use cft_ident_core::robot::tree::{Coordinate, Link};
-use cft_ident_files::config::{RobotFile, UrdfReplacement};
+use cft_ident_files::config::xml::{Tree, without_comments};
+use cft_ident_files::config::{RobotFile, UrdfReplacement, replaced_in_urdf};
 
-/// Numbers of frames that differ by less are one: URDFs have six digits.
-const SIX_DIGITS: f64 = 2e-5;
+/// The writing of one model into one source.
+struct UrdfWriting<'a> {
+    source: &'a SourceText<'a>,
+    /// The whole of the source as a robot.
+    robot: &'a RobotFile,
+    links: &'a [Link],
+    joints: &'a [String],
+    /// Link there of each link of the model.
+    found: Vec<usize>,
+    stand: Vec<SourceLink>,
+    held: BTreeMap<String, f64>,
+    out: UrdfReplacement,
+}
 
-/// What replaces inertials and friction in the URDF that `source` was read from; `file` names it in errors.
-/// `names` are what a controller calls the joints of the model, where it calls them otherwise. Joints are
-/// matched by name, and each joint's frame must be that of the model.
+/// The text of a URDF with a model in it, `robot` being the robot that it is; `notes` stand at its head. Joints are matched by
+/// name, and each joint's frame must be that of the model.
 ///
 /// # Errors
-/// [`ExportError::OtherUrdf`] for a joint that is not there or sits elsewhere.
-pub fn replacement(
+/// [`ExportError::OtherSource`] for a joint that is not there or sits elsewhere.
+pub fn written(
     arm: &Arm,
-    source: &RobotFile,
-    file: &str,
-    names: &BTreeMap<String, String>,
-) -> Result<UrdfReplacement, ExportError> {
-    let robot = source.robot();
-    let (links, joints) = (robot.tree().links(), robot.joint_names());
-    let other = |problem: String, remedy: &'static str| ExportError::OtherUrdf {
-        file: file.to_owned(),
-        problem,
-        remedy,
+    source: &SourceText,
+    robot: &RobotFile,
+    notes: &[String],
+) -> Result<WrittenSource, ExportError> {
+    let described = robot.robot();
+    let mut writing = UrdfWriting {
+        source,
+        robot,
+        links: described.tree().links(),
+        joints: described.joint_names(),
+        found: Vec::new(),
+        stand: Vec::new(),
+        held: BTreeMap::new(),
+        out: UrdfReplacement::default(),
     };
-    let moved_by = |name: &str| {
-        links.iter().position(|link| match &link.coordinate {
-            Coordinate::Joint(j) => joints[*j] == name,
+    for link in &arm.links {
+        writing.find(link)?;
+    }
+    for (i, link) in arm.links.iter().enumerate() {
+        writing.replace(i, link);
+    }
+    let own = writing.out.notes.clone();
+    writing.out.notes = notes.iter().chain(&own).cloned().collect();
+    let text = replaced_in_urdf(source.file, source.text, &writing.out)?;
+    let joints = arm
+        .joints()
+        .into_iter()
+        .map(|joint| writing.called(&joint.name));
+    Ok(WrittenSource {
+        joints: joints.collect(),
+        text: match source.folder {
+            None => text,
+            Some(folder) => with_meshes_of(&text, folder),
+        },
+        held: writing.held,
+        links: writing.stand.into_iter().map(Some).collect(),
+        notes: own,
+    })
+}
+
+/// Link of the URDF that ends a chain with the joints of a model, in the same order; none where no link does. The outer
+/// `None` is the whole URDF.
+pub fn tip_of(arm: &Arm, written: &str) -> Option<Option<String>> {
+    use cft_ident_files::config::UrdfChain;
+    let own: Vec<&str> = arm.joints().iter().map(|j| j.name.as_str()).collect();
+    let same = |tip: Option<&str>| {
+        let chain = UrdfChain::parse("", written, tip).ok()?;
+        let joints = chain.links.iter().filter_map(|link| link.joint.as_deref());
+        (chain.links.len() == arm.links.len() && joints.eq(own.iter().copied())).then_some(())
+    };
+    if same(None).is_some() {
+        return Some(None);
+    }
+    let last = arm.links.last().map(|link| link.name.clone())?;
+    same(Some(&last)).map(|()| Some(last))
+}
+
+impl UrdfWriting<'_> {
+    fn refused(&self, problem: String, remedy: &str) -> ExportError {
+        ExportError::OtherSource {
+            file: self.source.file.to_owned(),
+            problem,
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    /// What a joint of the model is called there.
+    fn called(&self, joint: &str) -> String {
+        match self.source.names.get(joint) {
+            Some(name) if !self.joints.iter().any(|other| other == joint) => name.clone(),
+            _ => joint.to_owned(),
+        }
+    }
+
+    fn moved_by(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|link| match &link.coordinate {
+            Coordinate::Joint(j) => self.joints[*j] == name,
             Coordinate::Follows(_) => false,
         })
-    };
-    let mut found: Vec<usize> = Vec::new();
-    let mut out = UrdfReplacement::default();
-    for link in &arm.links {
-        let at = match &link.joint {
+    }
+
+    /// Finds the next link of the model, which must stand where the model has it.
+    fn find(&mut self, link: &ArmLink) -> Result<(), ExportError> {
+        let index = match &link.joint {
             ArmJoint::Own(joint) => {
-                let called = names.get(&joint.name).map_or(&joint.name, |name| name);
-                let at = moved_by(&joint.name).or_else(|| moved_by(called));
-                let problem = || format!("has no joint `{called}`; it has {}", joints.join(", "));
+                let called = self.called(&joint.name);
+                let index = self.moved_by(&called);
+                let has = self.joints.join(", ");
                 let remedy = "give the URDF of this robot, or name its joints by `name` in [log.joint] of the robot file";
-                at.ok_or_else(|| other(problem(), remedy))?
+                index.ok_or_else(|| {
+                    self.refused(format!("has no joint `{called}`; it has {has}"), remedy)
+                })?
             }
             _ => {
-                let at = links.iter().position(|l| l.name == link.name);
+                let index = self.links.iter().position(|l| l.name == link.name);
                 let problem = || format!("has no link `{}`, which follows a joint", link.name);
-                at.ok_or_else(|| other(problem(), "give the URDF of this robot"))?
+                index.ok_or_else(|| self.refused(problem(), "give the URDF of this robot"))?
             }
         };
-        let parent = link.parent.map(|parent| found[parent]);
-        if let Some(differs) = difference(link, &links[at], parent) {
-            return Err(other(
-                format!(
-                    "link `{}` is not where the model has `{}`: {differs}",
-                    links[at].name, link.name
-                ),
+        let (parent, pose) = self.carried_by(index);
+        let there = &self.links[index];
+        let joint = match &there.coordinate {
+            Coordinate::Joint(j) => Some(self.joints[*j].clone()),
+            Coordinate::Follows(_) => None,
+        };
+        let there = SourceLink {
+            name: there.name.clone(),
+            parent,
+            kind: there.kind,
+            rotation: pose.0,
+            origin: pose.1,
+            axis: there.axis,
+            point: [0.0; 3],
+            joint,
+        };
+        if let Some(differs) = difference(link, &there) {
+            return Err(self.refused(
+                format!("link `{}` is not where the model has `{}`: {differs}", there.name, link.name),
                 "identify with a robot file of this URDF (`cft-ident new NAME --urdf FILE`), so that frames are one",
             ));
         }
-        found.push(at);
-        let name = &links[at].name;
-        out.inertials.insert(name.clone(), inertial(&link.body));
-        let frames = source.robot.frame.iter();
-        let lumped = frames.filter(|frame| frame.link == *name);
-        out.bare.extend(lumped.map(|frame| frame.name.clone()));
-        if let (ArmJoint::Own(joint), Coordinate::Joint(j)) = (&link.joint, &links[at].coordinate) {
-            let dynamics = dynamics([joint.damping, joint.friction]);
-            out.dynamics.insert(joints[*j].clone(), dynamics);
+        if let (ArmJoint::Fixed, Some(joint)) = (&link.joint, &there.joint) {
+            self.held.insert(joint.clone(), rest(link, &there));
+        }
+        self.found.push(index);
+        self.stand.push(there);
+        Ok(())
+    }
+
+    /// The model's link before one of the source, and the pose in it, joints between them at 0.
+    fn carried_by(&self, index: usize) -> (Option<usize>, Pose) {
+        let mut pose = (self.links[index].rotation, self.links[index].origin);
+        let mut next = self.links[index].parent;
+        while let Some(k) = next {
+            if let Some(link) = self.found.iter().position(|found| *found == k) {
+                return (Some(link), pose);
+            }
+            let here = (self.links[k].rotation, self.links[k].origin);
+            pose = composed(&self.behind(here, k), &pose);
+            next = self.links[k].parent;
+        }
+        (None, pose)
+    }
+
+    /// A frame behind the joint of a link that stands at 0, or at its offset where it follows one that does.
+    fn behind(&self, frame: Pose, index: usize) -> Pose {
+        let link = &self.links[index];
+        let at = match &link.coordinate {
+            Coordinate::Joint(_) => 0.0,
+            Coordinate::Follows(follows) => follows.offset,
+        };
+        displaced(&frame, link.kind, &link.axis, at)
+    }
+
+    /// Inertial and friction of one link, and what hangs on it beside the model.
+    fn replace(&mut self, i: usize, link: &ArmLink) {
+        let there = self.stand[i].clone();
+        let hung: Vec<usize> = (0..self.links.len())
+            .filter(|k| !self.found.contains(k) && self.carried_by(*k).0 == Some(i))
+            .collect();
+        let body = self.body_beside(link, &hung);
+        self.out
+            .inertials
+            .insert(there.name.clone(), inertial(&body));
+        self.bare(&there.name);
+        match (&link.joint, &there.joint) {
+            (ArmJoint::Own(joint), Some(name)) => {
+                let dynamics = dynamics([joint.damping, joint.friction]);
+                self.out.dynamics.insert(name.clone(), dynamics);
+            }
+            (ArmJoint::Mimic { .. }, _) => {
+                self.out.following.insert(there.name);
+            }
+            _ => {}
         }
     }
-    let inertials: BTreeSet<&String> = out.inertials.keys().collect();
-    out.bare.retain(|name| !inertials.contains(name));
-    Ok(out)
+
+    /// What is fixed to a link weighs nothing beside it.
+    fn bare(&mut self, link: &str) {
+        let links: BTreeSet<&str> = self.links.iter().map(|link| link.name.as_str()).collect();
+        let frames = self.robot.robot.frame.iter();
+        let fixed =
+            frames.filter(|frame| frame.link == link && !links.contains(frame.name.as_str()));
+        self.out.bare.extend(fixed.map(|frame| frame.name.clone()));
+    }
+
+    /// What is left for a link, where others hang on it whose mass is in its own: they keep theirs where the rest is a body.
+    fn body_beside(&mut self, link: &ArmLink, hung: &[usize]) -> Body {
+        let weight = |k: &usize| {
+            let given = self.robot.robot.link[*k].inertial.as_ref()?;
+            let pose = self.behind(self.carried_by(*k).1, *k);
+            Some(seen_from(&given.body(), &pose))
+        };
+        let bodies: Vec<Body> = hung.iter().filter_map(weight).collect();
+        if bodies.is_empty() {
+            return link.body;
+        }
+        let rest = without(&link.body, &bodies);
+        let names = hung.iter().map(|k| self.links[*k].name.as_str());
+        let (names, on) = (names.collect::<Vec<&str>>().join(", "), &link.name);
+        self.out
+            .notes
+            .push(hung_in_words(on, &names, rest.is_some()));
+        if rest.is_none() {
+            for k in hung {
+                let name = self.links[*k].name.clone();
+                self.bare(&name);
+                self.out.inertials.insert(name, inertial(&NEGLIGIBLE));
+            }
+        }
+        rest.unwrap_or(link.body)
+    }
 }
 
-/// Whether the joints of the URDF have the names of the model's, in the same order.
-pub fn same_names(arm: &Arm, source: &RobotFile) -> bool {
-    let own: Vec<&str> = arm.joints().iter().map(|j| j.name.as_str()).collect();
-    source.robot().joint_names() == own
+/// What became of the bodies that hang on a link beside the model.
+pub(super) fn hung_in_words(on: &str, names: &str, keeps: bool) -> String {
+    let is = format!("The mass of {names} is in the identified one of {on}, their joints at 0:");
+    match keeps {
+        true => format!("{is} they keep theirs, and {on} holds the rest."),
+        false => {
+            let little = NEGLIGIBLE.mass;
+            format!("{is} they weigh {little:e} kg here, for the rest would be no body.")
+        }
+    }
 }
 
-/// In what two links differ, in words.
-fn difference(link: &ArmLink, there: &Link, parent: Option<usize>) -> Option<String> {
-    if there.parent != parent {
-        return Some("it hangs on another link".to_owned());
+/// The text of a URDF whose relative files are those of another folder.
+fn with_meshes_of(text: &str, folder: &str) -> String {
+    let plain = without_comments(text);
+    let Ok(tree) = Tree::parse(&plain) else {
+        return text.to_owned();
+    };
+    let mut edits = TextEdits::of(&plain);
+    for element in tree.root().descendants() {
+        let key = match element.name() {
+            "mesh" | "texture" => "filename",
+            "compiler" => "meshdir",
+            _ => continue,
+        };
+        let relative =
+            |file: &&str| !file.starts_with('/') && !file.contains("://") && !file.is_empty();
+        if let Some(file) = element.attribute(key).filter(relative) {
+            edits.set(&element, key, format!("{folder}/{file}"));
+        }
     }
-    if there.kind != link.kind {
-        return Some("the one joint slides and the other turns".to_owned());
-    }
-    let off = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > SIX_DIGITS);
-    if off(&link.origin, &there.origin) {
-        let [a, b] = [words(&there.origin), words(&link.origin)];
-        return Some(format!("its origin is {a} m and not {b} m"));
-    }
-    if (0..3).any(|i| off(&link.rotation[i], &there.rotation[i])) {
-        return Some("its frame is turned otherwise".to_owned());
-    }
-    off(&link.axis, &there.axis).then(|| {
-        let [a, b] = [words(&there.axis), words(&link.axis)];
-        format!("its axis is {a} and not {b}")
-    })
+    edits.made(text)
 }

@@ -38,6 +38,6 @@ pub use trajectory::Trajectory;
 pub use urdf::beside::DRIVE_INERTIA;
 pub use urdf::capsules::DeclaredCapsules;
 pub use urdf::mesh::vertices as vertices_of_mesh;
-pub use urdf::mjcf::{MjcfJoint, replaced_in_mjcf};
+pub use urdf::mjcf::{MjcfText, mjcf_text};
 pub use urdf::source::{UrdfEdits as UrdfReplacement, WEIGHTLESS, replaced as replaced_in_urdf};
-pub use urdf::{ChainRequest, NO_LIMIT, UrdfChain};
+pub use urdf::{ChainRequest, NO_LIMIT, UrdfChain, xml};

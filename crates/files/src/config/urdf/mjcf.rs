@@ -1,189 +1,126 @@
-//! An MJCF in which inertials, armatures and joint friction are replaced: geoms, meshes, names, actuators and every
-//! other byte stay as they are written.
+//! The text of an MJCF with the files that it includes in the places where it includes them.
 
-use std::collections::BTreeMap;
-use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use super::{no_xml, xml};
-use crate::config::ConfigError;
-use cft_ident_logs::log::{escape, list};
+use crate::config::{ConfigError, text};
+use cft_ident_logs::log::{escape, shown};
 
-/// What is to stand in a body, by the joint that moves it.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct MjcfJoint {
-    /// `<inertial>` of the body.
-    pub inertial: String,
-    /// Attributes of the joint with their values.
-    pub attributes: Vec<(&'static str, String)>,
-    /// Where the body stands in the one around it \[m\].
-    pub origin: [f64; 3],
+/// Files in files. Descriptions of robots have two or three levels; half is enough for most, twice only delays the word that
+/// a file includes itself.
+const DEEPEST: usize = 16;
+
+/// An MJCF as one text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MjcfText {
+    pub text: String,
+    /// Files that it includes.
+    pub included: Vec<PathBuf>,
 }
 
-/// Numbers of frames that differ by less are one: such files have six digits.
-const SIX_DIGITS: f64 = 2e-5;
-
-/// The text of an MJCF with the replacements in it, and lines of a comment at its head; `file` names it in errors.
+/// Reads an MJCF and what it includes, from its own folder or from that of the file which includes it.
 ///
 /// # Errors
-/// [`ConfigError::Syntax`] where it is no well-formed XML, [`ConfigError::Kind`] where it is no MJCF of this robot.
-pub fn replaced_in_mjcf(
-    file: &str,
-    text: &str,
-    joints: &BTreeMap<String, MjcfJoint>,
-    notes: &[String],
+/// [`ConfigError::Read`] and [`ConfigError::Syntax`] of any of them.
+pub fn mjcf_text(path: &Path) -> Result<MjcfText, ConfigError> {
+    let mut included = Vec::new();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let text = flat(path, folder, 0, &mut included)?;
+    Ok(MjcfText { text, included })
+}
+
+fn flat(
+    path: &Path,
+    folder: &Path,
+    depth: usize,
+    included: &mut Vec<PathBuf>,
 ) -> Result<String, ConfigError> {
-    // comments become as many spaces, so that places are those of the text
-    let plain = xml::without_comments(text);
-    let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
-    let root = tree.root();
-    let other = |found: &'static str, remedy: String| ConfigError::Kind {
-        file: file.to_owned(),
-        found,
-        wanted: "an MJCF of this robot",
-        remedy,
-    };
-    if root.name() != "mujoco" {
-        let remedy = "give the file whose root is <mujoco>".to_owned();
-        return Err(other("another XML file", remedy));
-    }
-    let mut edits: Vec<(Range<usize>, String)> = Vec::new();
-    let mut found: Vec<&str> = Vec::new();
-    let mut all: Vec<&str> = Vec::new();
-    for body in root.descendants().filter(|e| e.name() == "body") {
-        for joint in body.children().filter(|e| e.name() == "joint") {
-            let name = joint.attribute("name").unwrap_or_default();
-            all.push(name);
-            let Some(with) = joints.get(name) else {
-                continue;
-            };
-            found.push(name);
-            if let Some(place) = body.attribute("pos")
-                && let Some(problem) = elsewhere(place, with.origin)
-            {
-                return Err(other(
-                    "an MJCF with other frames",
-                    format!(
-                        "body of joint {name}: {problem}; identify with a URDF of the same frames"
-                    ),
-                ));
-            }
-            match body.child("inertial") {
-                Some(old) => edits.push((old.range(), with.inertial.clone())),
-                None => {
-                    let end = xml::tag_end(&plain, body.range().start);
-                    edits.push((end..end, format!("\n{}", with.inertial)));
-                }
-            }
-            let begin = joint.range().start;
-            let tag = begin..xml::tag_end(&plain, begin);
-            let mut anew = plain[tag.clone()].to_owned();
-            for (attribute, value) in &with.attributes {
-                anew = with_attribute(&anew, attribute, value);
-            }
-            edits.push((tag, anew));
+    let file = shown(path);
+    let whole = text(path)?;
+    let plain = xml::without_comments(&whole);
+    let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(&file, wrong))?;
+    let includes = tree.root().descendants().filter(|e| e.name() == "include");
+    let mut pieces = Vec::new();
+    for include in includes {
+        let wrong = |problem: &str, remedy: &str| ConfigError::Value {
+            file: file.clone(),
+            line: include.line(),
+            key: "<include>".to_owned(),
+            problem: problem.to_owned(),
+            remedy: remedy.to_owned(),
+        };
+        let Some(name) = include.attribute("file") else {
+            return Err(wrong("has no file", "add file=\"...\""));
+        };
+        if depth >= DEEPEST {
+            let problem = format!("of {} is the {DEEPEST}th in one another", escape(name));
+            return Err(wrong(&problem, "let no file include itself"));
         }
+        let beside = path.parent().unwrap_or(Path::new("")).join(name);
+        let first = folder.join(name);
+        let inner = if first.exists() { first } else { beside };
+        let anew = flat(&inner, folder, depth + 1, included)?;
+        included.push(inner.clone());
+        pieces.push((include.range(), inside(&anew, &shown(&inner))?));
     }
-    let missing: Vec<&str> = joints.keys().map(String::as_str).collect();
-    let missing: Vec<&str> = missing.into_iter().filter(|j| !found.contains(j)).collect();
-    if !missing.is_empty() {
-        let remedy = format!(
-            "it lacks the joints {}; it has {}; name the model's joints as it does by `name` in [log.joint]",
-            escape(&list(missing)),
-            escape(&list(all))
-        );
-        return Err(other("an MJCF of another robot", remedy));
-    }
-    let head = root.range().start;
-    let lines = notes.iter().map(|line| line.replace("--", "- -"));
-    let comment: String = lines.map(|line| format!("  {line}\n")).collect();
-    edits.push((head..head, format!("<!--\n{comment}-->\n")));
-    edits.sort_by_key(|(range, _)| range.start);
-    let mut out = text.to_owned();
-    for (range, anew) in edits.into_iter().rev() {
+    let mut out = whole.clone();
+    for (range, anew) in pieces.into_iter().rev() {
         out.replace_range(range, &anew);
     }
     Ok(out)
 }
 
-/// What is wrong with the place of a body, in words.
-fn elsewhere(place: &str, origin: [f64; 3]) -> Option<String> {
-    let there: Vec<f64> = place
-        .split_whitespace()
-        .filter_map(|x| x.parse().ok())
-        .collect();
-    let off = there.len() != 3
-        || there
-            .iter()
-            .zip(origin)
-            .any(|(a, b)| (a - b).abs() > SIX_DIGITS);
-    off.then(|| format!("its place is {} m and not {origin:?} m", escape(place)))
-}
-
-/// A tag with an attribute set: in the place of the old value, or behind the others.
-fn with_attribute(tag: &str, name: &str, value: &str) -> String {
-    let old = tag.match_indices(name).find_map(|(at, _)| {
-        let begins = tag[..at].ends_with(|c: char| c.is_ascii_whitespace());
-        let rest = tag[at + name.len()..].trim_start();
-        let rest = rest.strip_prefix('=')?.trim_start();
-        let quote = rest.chars().next().filter(|c| matches!(c, '"' | '\''))?;
-        let length = rest[1..].find(quote)?;
-        let start = tag.len() - rest.len() + 1;
-        begins.then_some(start..start + length)
-    });
-    let mut out = tag.to_owned();
-    match old {
-        Some(range) => out.replace_range(range, value),
-        None => {
-            let end = out
-                .trim_end_matches('>')
-                .trim_end_matches('/')
-                .trim_end()
-                .len();
-            out.insert_str(end, &format!(" {name}=\"{value}\""));
-        }
-    }
-    out
+/// What stands in the root of a text.
+fn inside(text: &str, file: &str) -> Result<String, ConfigError> {
+    let plain = xml::without_comments(text);
+    let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
+    let whole = tree.root().range();
+    let begin = xml::tag_end(&plain, whole.start);
+    let end = plain[whole.clone()]
+        .rfind("</")
+        .map_or(begin, |at| whole.start + at);
+    Ok(text[begin..end.max(begin)].to_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn joints() -> BTreeMap<String, MjcfJoint> {
-        let of = MjcfJoint {
-            inertial: "<inertial mass=\"2\"/>".into(),
-            attributes: vec![("damping", "3.0".into()), ("armature", "0.5".into())],
-            origin: [0.0, 0.0, 0.1],
-        };
-        BTreeMap::from([("j".to_owned(), of)])
-    }
-
     #[test]
-    fn geoms_and_names_stay_and_inertia_and_friction_change() {
-        let text = "<mujoco>\n<worldbody>\n<body name=\"a\" pos=\"0 0 0.1\"><!-- kept --><inertial mass=\"9\" pos=\"0 0 0\"/>\n\
-                    <joint name=\"j\" damping='1' axis=\"0 0 1\"/><geom type=\"mesh\" mesh=\"m\"/>\n</body></worldbody></mujoco>\n";
-        let wanted = "<!--\n  n\n-->\n<mujoco>\n<worldbody>\n<body name=\"a\" pos=\"0 0 0.1\"><!-- kept --><inertial mass=\"2\"/>\n\
-                      <joint name=\"j\" damping='3.0' axis=\"0 0 1\" armature=\"0.5\"/><geom type=\"mesh\" mesh=\"m\"/>\n</body></worldbody></mujoco>\n";
-        let notes = ["n".to_owned()];
-        let got = replaced_in_mjcf("a.xml", text, &joints(), &notes).unwrap();
-        assert_eq!(got, wanted);
-    }
-
-    #[test]
-    fn another_robot_and_other_frames_are_refused() {
-        for (text, words) in [
-            ("<robot/>", "another XML file"),
-            (
-                "<mujoco><worldbody><body><joint name=\"k\"/></body></worldbody></mujoco>",
-                "lacks the joints j",
-            ),
-            (
-                "<mujoco><worldbody><body pos=\"0 0 0.2\"><joint name=\"j\"/></body></worldbody></mujoco>",
-                "its place is 0 0 0.2 m",
-            ),
-        ] {
-            let error = replaced_in_mjcf("a.xml", text, &joints(), &[]).unwrap_err();
-            assert!(error.to_string().contains(words), "{error}");
-        }
+    fn what_is_included_stands_in_its_place_and_a_circle_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let write =
+            |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        std::fs::create_dir(folder.path().join("parts")).unwrap();
+        write(
+            "a.xml",
+            "<mujoco><!-- <include/> --><include file=\"parts/b.xml\"/><actuator/></mujoco>",
+        );
+        write(
+            "parts/b.xml",
+            "<?xml version=\"1.0\"?>\n<mujocoinclude><worldbody/><include file='c.xml'/></mujocoinclude>",
+        );
+        write("parts/c.xml", "<mujoco>\n<sensor/></mujoco>");
+        let found = mjcf_text(&folder.path().join("a.xml")).unwrap();
+        assert_eq!(
+            found.text,
+            "<mujoco><!-- <include/> --><worldbody/>\n<sensor/><actuator/></mujoco>"
+        );
+        assert_eq!(found.included.len(), 2);
+        write(
+            "parts/c.xml",
+            "<mujoco><include file=\"parts/b.xml\"/></mujoco>",
+        );
+        let error = mjcf_text(&folder.path().join("a.xml")).unwrap_err();
+        assert!(
+            error.to_string().contains("let no file include itself"),
+            "{error}"
+        );
+        write(
+            "parts/b.xml",
+            "<mujoco><include file=\"gone.xml\"/></mujoco>",
+        );
+        let error = mjcf_text(&folder.path().join("a.xml")).unwrap_err();
+        assert!(error.to_string().contains("gone.xml"), "{error}");
     }
 }

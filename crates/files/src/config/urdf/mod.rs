@@ -16,7 +16,7 @@ mod possible;
 mod shapes;
 pub(super) mod source;
 mod tree;
-mod xml;
+pub mod xml;
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -19,6 +19,8 @@ pub struct UrdfEdits {
     pub bare: BTreeSet<String>,
     /// `<dynamics>` elements by joint.
     pub dynamics: BTreeMap<String, String>,
+    /// Links whose joints follow others, in whose friction theirs is: their `<dynamics>` goes.
+    pub following: BTreeSet<String>,
     /// Lines of a comment at the head.
     pub notes: Vec<String>,
 }
@@ -51,7 +53,9 @@ pub fn replaced(file: &str, text: &str, with: &UrdfEdits) -> Result<String, Conf
             "joint" => ("dynamics", with.dynamics.get(&*clean_name(name))),
             _ => continue,
         };
-        if anew.is_none() {
+        let child = element.child("child").and_then(|e| e.attribute("link"));
+        let follows = kind == "dynamics" && child.is_some_and(|link| with.following.contains(link));
+        if anew.is_none() && !follows {
             continue;
         }
         let old: Vec<Range<usize>> = element

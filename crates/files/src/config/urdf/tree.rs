@@ -13,7 +13,8 @@ use crate::config::serial_section::{
 };
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::{
-    Rotation, UNTURNED, Vector, add, of_roll_pitch_yaw, product, roll_pitch_yaw, turn,
+    Rotation, UNTURNED, Vector, about, add, dot, of_roll_pitch_yaw, product, roll_pitch_yaw, times,
+    turn,
 };
 use cft_ident_logs::log::{escape, list};
 
@@ -26,6 +27,8 @@ struct LinkSeat {
     origin: Vector,
     /// The rotation in the words of the file, where one joint alone says it.
     rpy: Option<Vector>,
+    /// Whether a joint beside the chain carries it, which stands at 0 here.
+    held: bool,
 }
 
 impl LinkSeat {
@@ -36,6 +39,30 @@ impl LinkSeat {
             rotation: UNTURNED,
             origin: [0.0; 3],
             rpy: None,
+            held: false,
+        }
+    }
+
+    /// Behind a joint that stands at 0, or at its offset where it follows one that does.
+    fn behind_held(self, joint: &Joint) -> Self {
+        let at = joint.mimic.as_ref().map_or(0.0, |mimic| mimic.offset);
+        let size = dot(&joint.axis, &joint.axis).sqrt();
+        let axis = times(1.0 / size.max(f64::MIN_POSITIVE), &joint.axis);
+        let turned = product(&self.rotation, &of_roll_pitch_yaw(&joint.rpy));
+        let origin = add(&self.origin, &turn(&self.rotation, &joint.xyz));
+        let (rotation, origin) = match joint.kind {
+            UrdfJointKind::Prismatic => (turned, add(&origin, &turn(&turned, &times(at, &axis)))),
+            UrdfJointKind::Revolute | UrdfJointKind::Continuous => {
+                (product(&turned, &about(&axis, at)), origin)
+            }
+            _ => (turned, origin),
+        };
+        Self {
+            on: self.on,
+            rotation,
+            origin,
+            rpy: None,
+            held: true,
         }
     }
 }
@@ -56,7 +83,7 @@ pub(super) fn chain(
     let named = parts.links.iter().enumerate();
     let index: BTreeMap<&str, usize> = named.map(|(i, link)| (link.name.as_str(), i)).collect();
     let (before, behind) = joints_of_links(parts, &index, place)?;
-    let (wanted, root) = match tip {
+    let (moves, root) = match tip {
         None => (vec![true; parts.joints.len()], root(parts, &before, place)?),
         Some(tip) => path_to(parts, &index, &before, tip, place)?,
     };
@@ -69,6 +96,7 @@ pub(super) fn chain(
     while let Some((joint, link, parent)) = next.pop() {
         let seat = match joint.map(|j| &parts.joints[j]) {
             None => parent,
+            Some(held) if is_held(joint, parent, &moves, parts) => parent.behind_held(held),
             Some(joint) => sit(joint, &parts.links[link].name, parent, &mut moving, place)?,
         };
         let body = parts.links[link].body.as_ref();
@@ -82,19 +110,20 @@ pub(super) fn chain(
             });
         }
         let on = hangs_on(&moving, seat.on);
-        let shapes = parts.links[link].shapes.iter();
+        let shapes = parts.links[link].shapes.iter().filter(|_| !seat.held);
         collisions.extend(shapes.map(|shape| CollisionShape {
             of: parts.links[link].name.clone(),
             on: on.clone(),
             shape: (shape.as_ref()).map(|shape| shape.seen_from(&seat.rotation, &seat.origin)),
         }));
-        if joint.is_some_and(|j| parts.joints[j].kind == UrdfJointKind::Fixed) && seat.on.is_some()
-        {
+        let is_fixed = joint.is_some_and(|j| parts.joints[j].kind == UrdfJointKind::Fixed);
+        if is_fixed && seat.on.is_some() && !seat.held {
             fixed.push((&parts.links[link].name, seat));
         }
         reached[link] = true;
         for &(j, child) in behind[link].iter().rev() {
-            if wanted[j] {
+            // what hangs beside the chain belongs to the link that carries it, and the base is no link
+            if moves[j] || seat.on.is_some() {
                 next.push((Some(j), child, seat));
             }
         }
@@ -119,6 +148,25 @@ pub(super) fn chain(
         collisions,
         ..finish(moving, frames, place)?
     })
+}
+
+/// Whether a joint is beside a chain that ends at a tip: it moves, no joint of the chain moves it, and it stands at 0.
+fn is_held(joint: Option<usize>, parent: LinkSeat, moves: &[bool], parts: &UrdfParts) -> bool {
+    let Some(j) = joint else { return false };
+    if parent.held {
+        return true;
+    }
+    // a follower of a joint of the chain moves with it
+    let mut chased = &parts.joints[j];
+    for _ in 0..parts.joints.len() {
+        let is = |other: &&Joint| Some(&other.name) == chased.mimic.as_ref().map(|m| &m.joint);
+        match parts.joints.iter().position(|other| is(&other)) {
+            Some(master) if moves[master] => return false,
+            Some(master) => chased = &parts.joints[master],
+            None => break,
+        }
+    }
+    !moves[j] && parts.joints[j].kind != UrdfJointKind::Fixed
 }
 
 /// The joint before each link, and the joints behind it with the links that they carry.
@@ -253,6 +301,7 @@ fn sit<'a>(
         rotation: product(&parent.rotation, &of_roll_pitch_yaw(&joint.rpy)),
         origin: add(&parent.origin, &turn(&parent.rotation, &joint.xyz)),
         rpy: unmoved.then_some(joint.rpy),
+        held: parent.held,
     };
     let kind = match joint.kind {
         UrdfJointKind::Fixed => return Ok(here),

@@ -22,11 +22,11 @@ const LONGEST_TAG: usize = 1 << 16;
 const MOST_NAMESPACES: usize = 1000;
 
 /// What is wrong with an element of xacro, and the way out.
-pub(super) const MACRO: &str = "is a macro of xacro, not yet expanded";
-pub(super) const EXPAND: &str = "expand it first: `xacro robot.urdf.xacro > robot.urdf`";
+pub const MACRO: &str = "is a macro of xacro, not yet expanded";
+pub const EXPAND: &str = "expand it first: `xacro robot.urdf.xacro > robot.urdf`";
 
 /// A text with spaces in place of its comments, in which the reader is strict about `--`, and with all of its lines.
-pub(super) fn without_comments(text: &str) -> Cow<'_, str> {
+pub fn without_comments(text: &str) -> Cow<'_, str> {
     let (mut out, mut rest) = (String::new(), text);
     while let Some((before, comment)) = rest.split_once("<!--") {
         let Some((comment, after)) = comment.split_once("-->") else {
@@ -45,13 +45,13 @@ pub(super) fn without_comments(text: &str) -> Cow<'_, str> {
 
 /// What is wrong with a text, and where.
 #[derive(Debug)]
-pub(super) struct MalformedText {
+pub struct MalformedText {
     pub line: usize,
     pub problem: ErrorText,
 }
 
 /// A text that was read.
-pub(super) struct Tree<'t> {
+pub struct Tree<'t> {
     document: Document<'t>,
     /// Where the lines end.
     ends: Vec<usize>,
@@ -59,14 +59,14 @@ pub(super) struct Tree<'t> {
 
 /// An element of a tree.
 #[derive(Clone, Copy)]
-pub(super) struct Element<'a, 't> {
+pub struct Element<'a, 't> {
     node: Node<'a, 't>,
     tree: &'a Tree<'t>,
 }
 
 impl<'t> Tree<'t> {
     /// Reads a text [`without_comments`].
-    pub(super) fn parse(text: &'t str) -> Result<Self, MalformedText> {
+    pub fn parse(text: &'t str) -> Result<Self, MalformedText> {
         let last = 1 + text.matches('\n').count();
         let refused = |problem: ErrorText| MalformedText {
             line: last,
@@ -122,7 +122,7 @@ impl<'t> Tree<'t> {
         Ok(())
     }
 
-    pub(super) fn root(&self) -> Element<'_, 't> {
+    pub fn root(&self) -> Element<'_, 't> {
         let node = self.document.root_element();
         Element { node, tree: self }
     }
@@ -134,43 +134,43 @@ impl<'t> Tree<'t> {
 
 impl<'a> Element<'a, '_> {
     /// Its name as written, with the prefix of its namespace.
-    pub(super) fn name(&self) -> &'a str {
+    pub fn name(&self) -> &'a str {
         name(&self.tree.document.input_text()[self.node.range()])
     }
 
     /// Line where it begins, from 1.
-    pub(super) fn line(&self) -> usize {
+    pub fn line(&self) -> usize {
         self.tree.line(self.node)
     }
 
     /// Where it stands in the text.
-    pub(super) fn range(&self) -> std::ops::Range<usize> {
+    pub fn range(&self) -> std::ops::Range<usize> {
         self.node.range()
     }
 
     /// Itself and all elements in it, however deep.
-    pub(super) fn descendants(self) -> impl Iterator<Item = Self> {
+    pub fn descendants(self) -> impl Iterator<Item = Self> {
         let elements = self.node.descendants().filter(Node::is_element);
         elements.map(move |node| Self { node, ..self })
     }
 
-    pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
+    pub fn attribute(&self, name: &str) -> Option<&'a str> {
         self.node.attribute(name)
     }
 
-    pub(super) fn children(self) -> impl Iterator<Item = Self> {
+    pub fn children(self) -> impl Iterator<Item = Self> {
         let elements = self.node.children().filter(Node::is_element);
         elements.map(move |node| Self { node, ..self })
     }
 
     /// First child of that name.
-    pub(super) fn child(self, name: &str) -> Option<Self> {
+    pub fn child(self, name: &str) -> Option<Self> {
         self.children().find(|child| child.name() == name)
     }
 }
 
 /// End of the tag that begins at `start`: in quotes it may have a `>`, and nowhere another `<`.
-pub(super) fn tag_end(text: &str, start: usize) -> usize {
+pub fn tag_end(text: &str, start: usize) -> usize {
     let mut quote = None;
     for (at, byte) in text.bytes().enumerate().skip(start + 1) {
         match (quote, byte) {
