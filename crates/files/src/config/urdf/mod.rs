@@ -13,6 +13,7 @@ pub mod mesh;
 pub(super) mod mjcf;
 mod parts;
 mod possible;
+mod seat;
 mod shapes;
 pub(super) mod source;
 mod tree;

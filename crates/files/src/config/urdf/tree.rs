@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::link::{Body, Link};
 use super::parts::{Joint, UrdfJointKind, UrdfParts, instead_of};
+use super::seat::{LinkSeat, is_held};
 use super::{CollisionShape, UrdfChain, UrdfPlace, turned};
 use crate::config::ConfigError;
 use crate::config::document::is_plain_name;
@@ -13,59 +14,9 @@ use crate::config::serial_section::{
 };
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::{
-    Rotation, UNTURNED, Vector, about, add, dot, of_roll_pitch_yaw, product, roll_pitch_yaw, times,
-    turn,
+    UNTURNED, Vector, add, of_roll_pitch_yaw, product, roll_pitch_yaw, turn,
 };
 use cft_ident_logs::log::{escape, list};
-
-/// Where a link of the URDF is: in which moving link, and how it lies there.
-#[derive(Clone, Copy)]
-struct LinkSeat {
-    /// Index of the moving link; `None` for the base.
-    on: Option<usize>,
-    rotation: Rotation,
-    origin: Vector,
-    /// The rotation in the words of the file, where one joint alone says it.
-    rpy: Option<Vector>,
-    /// Whether a joint beside the chain carries it, which stands at 0 here.
-    held: bool,
-}
-
-impl LinkSeat {
-    /// In the frame of a moving link, or of the base.
-    fn at(on: Option<usize>) -> Self {
-        Self {
-            on,
-            rotation: UNTURNED,
-            origin: [0.0; 3],
-            rpy: None,
-            held: false,
-        }
-    }
-
-    /// Behind a joint that stands at 0, or at its offset where it follows one that does.
-    fn behind_held(self, joint: &Joint) -> Self {
-        let at = joint.mimic.as_ref().map_or(0.0, |mimic| mimic.offset);
-        let size = dot(&joint.axis, &joint.axis).sqrt();
-        let axis = times(1.0 / size.max(f64::MIN_POSITIVE), &joint.axis);
-        let turned = product(&self.rotation, &of_roll_pitch_yaw(&joint.rpy));
-        let origin = add(&self.origin, &turn(&self.rotation, &joint.xyz));
-        let (rotation, origin) = match joint.kind {
-            UrdfJointKind::Prismatic => (turned, add(&origin, &turn(&turned, &times(at, &axis)))),
-            UrdfJointKind::Revolute | UrdfJointKind::Continuous => {
-                (product(&turned, &about(&axis, at)), origin)
-            }
-            _ => (turned, origin),
-        };
-        Self {
-            on: self.on,
-            rotation,
-            origin,
-            rpy: None,
-            held: true,
-        }
-    }
-}
 
 /// A moving link that is being gathered.
 struct MovingLink<'a> {
@@ -148,25 +99,6 @@ pub(super) fn chain(
         collisions,
         ..finish(moving, frames, place)?
     })
-}
-
-/// Whether a joint is beside a chain that ends at a tip: it moves, no joint of the chain moves it, and it stands at 0.
-fn is_held(joint: Option<usize>, parent: LinkSeat, moves: &[bool], parts: &UrdfParts) -> bool {
-    let Some(j) = joint else { return false };
-    if parent.held {
-        return true;
-    }
-    // a follower of a joint of the chain moves with it
-    let mut chased = &parts.joints[j];
-    for _ in 0..parts.joints.len() {
-        let is = |other: &&Joint| Some(&other.name) == chased.mimic.as_ref().map(|m| &m.joint);
-        match parts.joints.iter().position(|other| is(&other)) {
-            Some(master) if moves[master] => return false,
-            Some(master) => chased = &parts.joints[master],
-            None => break,
-        }
-    }
-    !moves[j] && parts.joints[j].kind != UrdfJointKind::Fixed
 }
 
 /// The joint before each link, and the joints behind it with the links that they carry.

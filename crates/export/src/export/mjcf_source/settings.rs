@@ -1,0 +1,190 @@
+//! What holds of a whole MJCF: compiler, options, actuators.
+
+use std::collections::BTreeSet;
+
+use super::SourceWriting;
+use super::layout::ACTUATORS;
+use crate::export::mjcf::tendons;
+use crate::export::prepared::words;
+use crate::export::source_link::NEGLIGIBLE;
+use cft_ident_files::config::xml::Element;
+
+/// Attributes of the compiler that change bodies, with what is the same as none.
+const UNDOING: [(&str, &str); 5] = [
+    ("inertiafromgeom", "false auto"),
+    ("settotalmass", "-1"),
+    ("boundmass", "0"),
+    ("boundinertia", "0"),
+    ("balanceinertia", "false"),
+];
+
+/// Flags that switch off what was identified.
+const FLAGS: [&str; 6] = [
+    "gravity",
+    "damper",
+    "passive",
+    "frictionloss",
+    "constraint",
+    "equality",
+];
+
+impl<'p, 't> SourceWriting<'_, 't, 'p> {
+    /// Takes out what changes bodies while they are compiled; files of meshes stay where they are.
+    pub(super) fn compilers(&mut self, root: Element<'p, 't>) {
+        let all: Vec<Element> = root.children().filter(|e| e.name() == "compiler").collect();
+        let mut bounded = false;
+        for compiler in &all {
+            for (key, none) in UNDOING {
+                let Some(value) = compiler.attribute(key) else {
+                    continue;
+                };
+                let harmless = none.split(' ').any(|word| word == value)
+                    || value.trim().parse::<f64>().is_ok_and(|x| x <= 0.0);
+                if harmless {
+                    continue;
+                }
+                self.edits.remove_attribute(compiler, key);
+                self.notes.push(format!(
+                    "Taken out: <compiler {key}=\"{value}\"/>, which changes bodies."
+                ));
+                bounded |= key.starts_with("bound");
+            }
+        }
+        if bounded {
+            self.massless();
+        }
+        if let Some(folder) = self.source.folder {
+            self.folders(root, &all, folder);
+        }
+    }
+
+    /// Files of meshes and textures are found from the folder of the output.
+    fn folders(&mut self, root: Element<'p, 't>, all: &[Element<'p, 't>], folder: &str) {
+        let mut anew = Vec::new();
+        for key in ["assetdir", "meshdir", "texturedir"] {
+            let given = all
+                .iter()
+                .rev()
+                .find(|compiler| compiler.attribute(key).is_some());
+            let whole = all
+                .iter()
+                .any(|compiler| compiler.attribute("assetdir").is_some());
+            match given {
+                Some(compiler) => {
+                    let old = compiler.attribute(key).unwrap_or_default();
+                    if !old.starts_with('/') {
+                        self.edits.set(compiler, key, format!("{folder}/{old}"));
+                    }
+                }
+                None if key != "assetdir" && !whole => anew.push((key, folder)),
+                None => {}
+            }
+        }
+        match all.last() {
+            Some(last) => anew
+                .iter()
+                .for_each(|(key, folder)| self.edits.set(last, key, *folder)),
+            None => {
+                let words = anew
+                    .iter()
+                    .map(|(key, folder)| format!(" {key}=\"{folder}\""));
+                let text = format!("  <compiler{}/>", words.collect::<String>());
+                self.edits.put_into(&root, &text);
+            }
+        }
+    }
+
+    /// Bodies on joints that only a bound of the compiler gave a mass.
+    fn massless(&mut self) {
+        for index in 0..self.layout.bodies.len() {
+            let body = &self.layout.bodies[index];
+            let found = self.found.contains(&Some(index)) || body.joints.is_empty();
+            if !found && self.carried_by(index).0.is_none() {
+                let light = self
+                    .weight_of(index)
+                    .is_some_and(|body| body.mass < NEGLIGIBLE.mass);
+                if light {
+                    self.weigh_little(index);
+                }
+            }
+        }
+    }
+
+    /// Gravity is the model's, and no flag switches off what was identified.
+    pub(super) fn options(&mut self, root: Element<'p, 't>) {
+        let all: Vec<Element> = root.children().filter(|e| e.name() == "option").collect();
+        let given = all
+            .iter()
+            .rev()
+            .find(|option| option.attribute("gravity").is_some());
+        let old = given
+            .and_then(|option| option.attribute("gravity"))
+            .unwrap_or("0 0 -9.81");
+        let number = |word: &str| word.parse::<f64>().ok();
+        let there: Vec<f64> = old.split_whitespace().filter_map(number).collect();
+        let gravity = self.arm.gravity;
+        let same = there.len() == 3 && there.iter().zip(gravity).all(|(a, b)| (a - b).abs() < 1e-9);
+        if !same {
+            let anew = words(&gravity);
+            self.notes.push(format!(
+                "Gravity is {anew} m/s^2 as in the model; the source has {old}."
+            ));
+            match given.or(all.last()) {
+                Some(option) => self.edits.set(option, "gravity", anew),
+                None => self
+                    .edits
+                    .put_into(&root, &format!("  <option gravity=\"{anew}\"/>")),
+            }
+        }
+        for flag in all
+            .iter()
+            .flat_map(|option| option.children())
+            .filter(|e| e.name() == "flag")
+        {
+            for key in FLAGS {
+                if flag.attribute(key) == Some("disable") {
+                    self.edits.remove_attribute(&flag, key);
+                    self.notes
+                        .push(format!("Taken out: <flag {key}=\"disable\"/>."));
+                }
+            }
+        }
+    }
+
+    /// Armature and damping of motors are in the identified ones of the joints that they move.
+    pub(super) fn actuators(&mut self, root: Element<'p, 't>) {
+        let found = self.found.iter().flatten();
+        let joints = found.flat_map(|index| &self.layout.bodies[*index].joints);
+        let moved: BTreeSet<&str> = joints.map(|joint| joint.name).collect();
+        let sections = root.children().filter(|e| e.name() == "actuator");
+        let all = sections.flat_map(|section| section.children());
+        for actuator in all.filter(|e| ACTUATORS.contains(&e.name())) {
+            let joint = actuator
+                .attribute("joint")
+                .or(actuator.attribute("jointinparent"));
+            let ours = joint.is_some_and(|joint| moved.contains(joint));
+            if !ours && actuator.attribute("tendon").is_none() {
+                continue;
+            }
+            for key in ["armature", "damping"] {
+                let old = self.layout.value(&actuator, key, "main");
+                let zero = |text: &str| text.split_whitespace().all(|x| x.parse() == Ok(0.0));
+                if let Some(old) = old.filter(|old| !zero(old)) {
+                    let name = actuator.attribute("name").or(joint).unwrap_or_default();
+                    self.notes
+                        .push(format!("Taken out: {key}=\"{old}\" of actuator {name}."));
+                    self.edits.set(&actuator, key, "0");
+                }
+            }
+        }
+    }
+
+    /// Gear trains of two joints, as tendons of the names that they have in a file of the program's own.
+    pub(super) fn trains(&mut self, root: Element<'p, 't>) {
+        if self.arm.trains().is_some() && !self.arm.couplings.is_empty() {
+            let mut text = String::new();
+            tendons(&mut text, self.arm, &|joint| self.called(joint));
+            self.edits.put_last(&root, &text);
+        }
+    }
+}
