@@ -111,7 +111,8 @@ mod tests {
         let text = "<?xml version=\"1.0\"?>\n<robot name=\"r\">\n  <!-- <link name=\"a\"/> kept -->\n  \
                     <link name=\"a\"/>\n  <link name=\"b\"><visual><mesh name='x>y'/></visual><inertial>old</inertial></link>\n  \
                     <link name=\"tool\"><inertial>lumped</inertial></link>\n  \
-                    <joint name=\"j\" type=\"revolute\"><dynamics damping=\"9\"/><limit/></joint>\n</robot>\n";
+                    <joint name=\"j\" type=\"revolute\"><dynamics damping=\"9\"/><limit/></joint>\n  \
+                    <joint name=\"k\" type=\"revolute\"><child link=\"right\"/><dynamics damping=\"9\"/></joint>\n</robot>\n";
         let with = UrdfEdits {
             inertials: BTreeMap::from([
                 ("a", "<inertial>1</inertial>"),
@@ -122,6 +123,7 @@ mod tests {
             .collect(),
             bare: BTreeSet::from(["tool".to_owned()]),
             dynamics: BTreeMap::from([("j".to_owned(), "<dynamics friction=\"3\"/>".to_owned())]),
+            following: BTreeSet::from(["right".to_owned()]),
             notes: vec!["a -- b".to_owned()],
         };
         let wanted = "<?xml version=\"1.0\"?>\n<!--\n  a - - b\n-->\n<robot name=\"r\">\n  \
@@ -129,7 +131,8 @@ mod tests {
                       <link name=\"a\">\n    <inertial>1</inertial>\n  </link>\n  \
                       <link name=\"b\"><visual><mesh name='x>y'/></visual><inertial>2</inertial></link>\n  \
                       <link name=\"tool\">NONE</link>\n  \
-                      <joint name=\"j\" type=\"revolute\"><dynamics friction=\"3\"/><limit/></joint>\n</robot>\n";
+                      <joint name=\"j\" type=\"revolute\"><dynamics friction=\"3\"/><limit/></joint>\n  \
+                      <joint name=\"k\" type=\"revolute\"><child link=\"right\"/></joint>\n</robot>\n";
         let wanted = wanted.replace("NONE", WEIGHTLESS);
         assert_eq!(replaced("r.urdf", text, &with).unwrap(), wanted);
     }
