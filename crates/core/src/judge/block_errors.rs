@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::bounded::{self, Bound};
 use super::sums::Terms;
 use crate::math::cholesky;
-use crate::math::lanes::{LaneWork, Simd, widest};
+use crate::math::gram::quadratic_form;
 
 /// A fit to all blocks: it leaves no more of them than fits without each of them.
 pub struct FitToAll<'a> {
@@ -141,34 +141,8 @@ impl<'a> FitToAll<'a> {
             let first = x.len() - torque.len();
             own.iter().for_each(|(i, a)| x[*a] = values[*i]);
             x[first..].iter_mut().zip(torque).for_each(|(x, t)| *x = -t);
-            let square = widest(Square {
-                x: &x,
-                sums: sums.as_slice(),
-            });
-            square.max(0.0)
+            quadratic_form(sums, &x).max(0.0)
         };
         joints.map(of_joint).collect()
-    }
-}
-
-/// x' S x.
-struct Square<'a> {
-    x: &'a [f64],
-    sums: &'a [f64],
-}
-
-impl LaneWork for Square<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> f64 {
-        let mut along = vec![0.0; self.x.len()];
-        let columns = self.sums.chunks_exact(self.x.len().max(1)).zip(self.x);
-        for (column, x) in columns.filter(|(_, x)| **x != 0.0) {
-            for (to, y) in along.iter_mut().zip(column) {
-                *to += x * y;
-            }
-        }
-        self.x.iter().zip(&along).map(|(x, y)| x * y).sum()
     }
 }

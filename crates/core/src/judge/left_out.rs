@@ -6,6 +6,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::bounded::{self, Bound};
 use super::sums::{BlockSums, Term, Terms};
+use crate::math::cholesky::substitute;
+use crate::math::gram::quadratic_form;
 
 /// What a hypothesis takes off the squared errors of blocks that were left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,6 +84,14 @@ struct Without {
     values: DVector<f64>,
     /// What pulls each term still, in the rows of the block itself, by joint.
     pull: Vec<DVector<f64>>,
+    /// Products of the terms of each joint among each other in these rows, closely packed.
+    products: Vec<DMatrix<f64>>,
+}
+
+/// The fit of the terms in use to all fitted blocks.
+pub struct WholeFit {
+    factor: Cholesky<f64, Dyn>,
+    values: DVector<f64>,
 }
 
 /// Fits of terms with each block left out.
@@ -112,12 +122,16 @@ impl<'a> BlocksLeftOut<'a> {
             let factor = normal.cholesky()?;
             let values = factor.solve(&side);
             let joints = block.iter().zip(&own);
-            let pull = joints.map(|(sums, own)| pull(sums, own, &values)).collect();
+            let pull = |(sums, own): (_, &Vec<_>)| pull(sums, own, &values);
+            let products = |(sums, own): (&DMatrix<f64>, &Vec<(usize, usize)>)| {
+                DMatrix::from_fn(own.len(), own.len(), |r, c| sums[(own[r].1, own[c].1)])
+            };
             without.push(Without {
                 block: (b < fitted).then_some(b),
+                pull: joints.clone().map(pull).collect(),
+                products: joints.map(products).collect(),
                 factor,
                 values,
-                pull,
             });
         }
         Some(BlocksLeftOut {
@@ -166,23 +180,23 @@ impl<'a> BlocksLeftOut<'a> {
         let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
         let diagonal: Vec<f64> = all.own.diagonal().iter().copied().collect();
         let mut gains = Vec::with_capacity(self.without.len());
+        let mut others = all.clone();
         for (b, without) in self.without.iter().enumerate() {
-            let mut others = all.clone();
+            others.copy_from(&all);
             if without.block.is_some() && there(b) {
-                others.subtract(&Beside::of(self, more, &self.sums.blocks[b]));
+                others.add(self, more, (&self.sums.blocks[b], -1.0));
             }
-            let through = without.factor.solve(&others.with);
-            let mut own = &others.own - others.with.tr_mul(&through);
+            let mut beyond = others.beyond(&without.factor, &without.values);
             for (i, x) in diagonal.iter().enumerate() {
-                own[(i, i)] += self.terms.ridge * x;
+                beyond.own[(i, i)] += self.terms.ridge * x;
             }
-            let right = &others.right - others.with.tr_mul(&without.values);
-            let amplitude = bounded::solve(&own, &right, &bounds);
-            let moved = -through * &amplitude;
+            let amplitude = bounded::solve(&beyond.own, &beyond.right, &bounds);
+            let moved = &beyond.through * -&amplitude;
+            let values = &without.values + &moved;
             let added = if there(b) { more } else { &[] };
             let gain = |j: usize| -> f64 {
-                let block = &self.sums.blocks[b][j];
-                let change = self.change(j, block, added, (without, &moved, &amplitude));
+                let moves = (without, &moved, &values);
+                let change = self.change((b, j), added, moves, &amplitude);
                 -self.terms.weights[j] * change
             };
             gains.push((0..joints).map(gain).collect());
@@ -190,67 +204,82 @@ impl<'a> BlocksLeftOut<'a> {
         ErrorGain::of(&gains)
     }
 
-    /// Change of a joint's squared error in a block.
+    /// Change of a joint's squared error in a block by more terms, for which those in use have moved to `values`.
     fn change(
         &self,
-        j: usize,
-        block: &DMatrix<f64>,
+        (b, j): (usize, usize),
         more: &[Term],
-        (without, moved, amplitude): (&Without, &DVector<f64>, &DVector<f64>),
+        (without, moved, values): (&Without, &DVector<f64>, &DVector<f64>),
+        amplitude: &DVector<f64>,
     ) -> f64 {
         let own = &self.own[j];
+        let step: Vec<f64> = own.iter().map(|(i, _)| moved[*i]).collect();
+        let pulled = step.iter().zip(without.pull[j].iter()).map(|(x, p)| x * p);
+        let mut change = quadratic_form(&without.products[j], &step) - 2.0 * pulled.sum::<f64>();
+        let block = &self.sums.blocks[b][j];
         let tau = block.nrows() - 1;
-        let mut change = 0.0;
-        for (k, &(i, a)) in own.iter().enumerate() {
-            let step = moved[i];
-            if step != 0.0 {
-                let column = block.column(a);
-                let through: f64 = own.iter().map(|&(l, b)| column[b] * moved[l]).sum();
-                change += step * (through - 2.0 * without.pull[j][k]);
-            }
-        }
         let added = more.iter().zip(amplitude.iter());
         let added = added.filter(|(_, x)| **x != 0.0);
         let added = added.filter_map(|(term, x)| Some((term.column(j)?, *x)));
         let added: Vec<(usize, f64)> = added.collect();
         for &(c, x) in &added {
             let column = block.column(c);
-            let used = own.iter();
-            let used = used.map(|&(i, a)| column[a] * (without.values[i] + moved[i]));
-            let used: f64 = used.sum();
+            let used: f64 = own.iter().map(|&(i, a)| column[a] * values[i]).sum();
             let among: f64 = added.iter().map(|&(d, y)| column[d] * y).sum();
             change += x * (among + 2.0 * used - 2.0 * column[tau]);
         }
         change
     }
 
+    /// Fits the terms in use to all fitted blocks; none where these determine nothing.
+    pub fn whole_fit(&self) -> Option<WholeFit> {
+        let (normal, right) = self.terms.firm_normal(&self.total);
+        let factor = normal.cholesky()?;
+        let values = factor.solve(&right);
+        Some(WholeFit { factor, values })
+    }
+
+    /// Gain of more terms in the weighted squares of all fitted blocks, each of which the fits hold.
+    pub fn gain_of_fit(&self, more: &[Term], whole: &WholeFit) -> f64 {
+        let all = Beside::of(self, more, &self.total);
+        let (beyond, amplitude) = self.amplitude_beside(more, &all, whole);
+        2.0 * beyond.right.dot(&amplitude) - quadratic_form(&beyond.own, amplitude.as_slice())
+    }
+
     /// Least part of the square of a column of more terms that is not in the span of those in use, over all fitted blocks;
     /// 0 where a column is nil.
     pub(crate) fn share_of_its_own(&self, more: &[Term]) -> f64 {
-        let (normal, _) = self.terms.firm_normal(&self.total);
         let all = Beside::of(self, more, &self.total);
-        let Some(factor) = normal.cholesky() else {
+        let Some(whole) = self.whole_fit() else {
             return 0.0;
         };
-        let own = &all.own - all.with.tr_mul(&factor.solve(&all.with));
+        let own = all.beyond(&whole.factor, &whole.values).own;
         let part = |i: usize| own[(i, i)] / all.own[(i, i)].max(f64::MIN_POSITIVE);
         (0..more.len()).map(part).fold(f64::INFINITY, f64::min)
     }
 
     /// Amplitudes of terms that are there in some blocks alone, beside those in use over all fitted blocks.
     pub(crate) fn amplitude_within(&self, more: &[Term], there: Range<usize>) -> DVector<f64> {
-        let (normal, right) = self.terms.firm_normal(&self.total);
         let all = self.within(more, &there);
-        let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
-        let Some(factor) = normal.cholesky() else {
-            return DVector::zeros(more.len());
-        };
-        let mut own = &all.own - all.with.tr_mul(&factor.solve(&all.with));
-        for i in 0..more.len() {
-            own[(i, i)] += self.terms.ridge * all.own[(i, i)];
+        match self.whole_fit() {
+            Some(whole) => self.amplitude_beside(more, &all, &whole).1,
+            None => DVector::zeros(more.len()),
         }
-        let right = &all.right - all.with.tr_mul(&factor.solve(&right));
-        bounded::solve(&own, &right, &bounds)
+    }
+
+    fn amplitude_beside(
+        &self,
+        more: &[Term],
+        all: &Beside,
+        whole: &WholeFit,
+    ) -> (BeyondUsed, DVector<f64>) {
+        let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
+        let mut beyond = all.beyond(&whole.factor, &whole.values);
+        for i in 0..more.len() {
+            beyond.own[(i, i)] += self.terms.ridge * all.own[(i, i)];
+        }
+        let amplitude = bounded::solve(&beyond.own, &beyond.right, &bounds);
+        (beyond, amplitude)
     }
 }
 
@@ -272,7 +301,26 @@ struct Beside {
     right: DVector<f64>,
 }
 
+/// What a fit of the terms in use leaves of more terms.
+struct BeyondUsed {
+    /// What the terms in use take over for a unit of each.
+    through: DMatrix<f64>,
+    own: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
 impl Beside {
+    /// What the terms in use leave of these products, by the factor of their normal matrix and their values.
+    fn beyond(&self, factor: &Cholesky<f64, Dyn>, values: &DVector<f64>) -> BeyondUsed {
+        let mut through = self.with.clone();
+        substitute(factor.l_dirty(), &mut through);
+        BeyondUsed {
+            own: &self.own - self.with.tr_mul(&through),
+            right: &self.right - self.with.tr_mul(values),
+            through,
+        }
+    }
+
     fn of(used: &BlocksLeftOut, more: &[Term], sums: &[DMatrix<f64>]) -> Self {
         let (u, k) = (used.terms.len(), more.len());
         let mut out = Beside {
@@ -280,27 +328,33 @@ impl Beside {
             own: DMatrix::zeros(k, k),
             right: DVector::zeros(k),
         };
-        for (c, term) in more.iter().enumerate() {
-            for &(j, column) in &term.columns {
-                let w = used.terms.weights[j];
-                let products = sums[j].column(column);
-                for &(i, a) in &used.own[j] {
-                    out.with[(i, c)] += w * products[a];
-                }
-                for (d, other) in more.iter().enumerate() {
-                    if let Some(other) = other.column(j) {
-                        out.own[(d, c)] += w * products[other];
-                    }
-                }
-                out.right[c] += w * products[products.len() - 1];
-            }
-        }
+        out.add(used, more, (sums, 1.0));
         out
     }
 
-    fn subtract(&mut self, other: &Beside) {
-        self.with -= &other.with;
-        self.own -= &other.own;
-        self.right -= &other.right;
+    /// Adds the products of some rows so many times.
+    fn add(&mut self, used: &BlocksLeftOut, more: &[Term], (sums, times): (&[DMatrix<f64>], f64)) {
+        for (c, term) in more.iter().enumerate() {
+            for &(j, column) in &term.columns {
+                let w = times * used.terms.weights[j];
+                let products = sums[j].column(column);
+                let mut with = self.with.column_mut(c);
+                for &(i, a) in &used.own[j] {
+                    with[i] += w * products[a];
+                }
+                for (d, other) in more.iter().enumerate() {
+                    if let Some(other) = other.column(j) {
+                        self.own[(d, c)] += w * products[other];
+                    }
+                }
+                self.right[c] += w * products[products.len() - 1];
+            }
+        }
+    }
+
+    fn copy_from(&mut self, other: &Beside) {
+        self.with.copy_from(&other.with);
+        self.own.copy_from(&other.own);
+        self.right.copy_from(&other.right);
     }
 }

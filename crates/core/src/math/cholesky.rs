@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::lanes::{LaneWork, Simd, widest};
+use super::rfactor::dot;
 
 /// Columns that are taken off another at once.
 const TOGETHER: usize = 4;
@@ -44,21 +45,55 @@ impl LaneWork for CholeskySolve<'_> {
             column[0] = diagonal;
             column[1..].iter_mut().for_each(|x| *x /= diagonal);
         }
-        for j in 0..n {
-            let (x, below) = b[j..].split_at_mut(1);
-            x[0] /= a[j * n + j];
-            let column = &a[j * n + j + 1..(j + 1) * n];
-            for (b, l) in below.iter_mut().zip(column) {
-                *b -= x[0] * l;
-            }
-        }
-        for j in (0..n).rev() {
-            let (x, below) = b[j..].split_at_mut(1);
-            let column = &a[j * n + j + 1..(j + 1) * n];
-            let known: f64 = column.iter().zip(below).map(|(l, b)| l * *b).sum();
-            x[0] = (x[0] - known) / a[j * n + j];
-        }
+        substitute_column(a, n, b);
         true
+    }
+}
+
+/// Solves L L' X = B; of the factor the lower half is read, and X takes the place of B.
+pub(crate) fn substitute(factor: &DMatrix<f64>, columns: &mut DMatrix<f64>) {
+    debug_assert!(factor.is_square() && factor.nrows() == columns.nrows());
+    widest(Substitution {
+        n: factor.nrows(),
+        factor: factor.as_slice(),
+        columns: columns.as_mut_slice(),
+    });
+}
+
+/// Systems of `n` unknowns with the same factor, their right sides one behind the other.
+struct Substitution<'a> {
+    n: usize,
+    factor: &'a [f64],
+    columns: &'a mut [f64],
+}
+
+impl LaneWork for Substitution<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        for column in self.columns.chunks_exact_mut(self.n.max(1)) {
+            substitute_column(self.factor, self.n, column);
+        }
+    }
+}
+
+/// Solves L L' x = b in place; what is zero at the begin of b stays so in L' x.
+#[inline(always)]
+fn substitute_column(factor: &[f64], n: usize, b: &mut [f64]) {
+    let first = b.iter().position(|x| *x != 0.0).unwrap_or(n);
+    for j in first..n {
+        let (x, below) = b[j..].split_at_mut(1);
+        let column = &factor[j * n + j..(j + 1) * n];
+        x[0] /= column[0];
+        for (b, l) in below.iter_mut().zip(&column[1..]) {
+            *b -= x[0] * l;
+        }
+    }
+    for j in (0..n).rev() {
+        let (x, below) = b[j..].split_at_mut(1);
+        let column = &factor[j * n + j..(j + 1) * n];
+        x[0] = (x[0] - dot(&column[1..], below)) / column[0];
     }
 }
 
@@ -97,6 +132,10 @@ mod tests {
             let (mut factor, mut b) = (a.clone(), &a * &x);
             assert!(solve(&mut factor, &mut b));
             assert!((b - &x).amax() < 1e-11 || n == 0, "{n}");
+            let solutions = DMatrix::from_fn(n, 3, |i, k| (i as f64 - 1.0) * k as f64);
+            let mut columns = &a * &solutions;
+            substitute(&factor, &mut columns);
+            assert!((columns - &solutions).iter().all(|x| x.abs() < 1e-11));
             if n > 0 {
                 let mut a = a;
                 a[(n - 1, n - 1)] = f64::NAN;

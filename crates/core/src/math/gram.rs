@@ -26,6 +26,37 @@ pub fn gram(rows: &[f64], columns: usize) -> DMatrix<f64> {
     out
 }
 
+/// x' S x of a symmetric matrix S.
+pub(crate) fn quadratic_form(sums: &DMatrix<f64>, x: &[f64]) -> f64 {
+    debug_assert!(sums.is_square() && sums.nrows() == x.len());
+    widest(QuadraticForm {
+        sums: sums.as_slice(),
+        x,
+    })
+}
+
+/// x' S x, the columns of S one behind the other.
+struct QuadraticForm<'a> {
+    sums: &'a [f64],
+    x: &'a [f64],
+}
+
+impl LaneWork for QuadraticForm<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> f64 {
+        let mut along = vec![0.0; self.x.len()];
+        let columns = self.sums.chunks_exact(self.x.len().max(1)).zip(self.x);
+        for (column, x) in columns.filter(|(_, x)| **x != 0.0) {
+            for (to, y) in along.iter_mut().zip(column) {
+                *to += x * y;
+            }
+        }
+        self.x.iter().zip(&along).map(|(x, y)| x * y).sum()
+    }
+}
+
 /// Products of the columns of a block of rows, which are summed up in `out`.
 struct GramProducts<'a> {
     rows: &'a [f64],

@@ -131,6 +131,25 @@ fn blocks_that_judge_alone_are_judged_by_the_fit_to_all_others() {
 }
 
 #[test]
+fn the_gain_of_a_fit_to_all_blocks_is_the_fall_of_their_squares_and_above_that_of_blocks_left_out()
+{
+    let (sums, terms) = (sums(), terms());
+    let left_out = BlocksLeftOut::new(&sums, 0, &terms).expect("rows that determine all");
+    let whole = left_out.whole_fit().expect("rows that determine all");
+    let squares = |terms: &Terms| {
+        let values = solved(terms, |_| true);
+        let each = (0..BLOCKS).flat_map(|b| [0, 1].map(|j| (b, j)));
+        let each = each.map(|(b, j)| WEIGHTS[j] * left(terms, &values, b, j));
+        each.sum::<f64>()
+    };
+    for more in [more(), more()[..1].to_vec()] {
+        let gain = left_out.gain_of_fit(&more, &whole);
+        near(gain, squares(&terms) - squares(&terms.with(&more)), 1e-8);
+        assert!(left_out.gain(&more).value < gain);
+    }
+}
+
+#[test]
 fn a_gain_is_the_fall_of_the_errors_where_all_is_fitted_anew() {
     let (sums, terms) = (sums(), terms());
     let left_out = BlocksLeftOut::new(&sums, 0, &terms).expect("rows");
