@@ -39,6 +39,9 @@ pub struct RejectedCandidate {
     pub gain: ErrorGain,
 }
 
+/// Candidates that are looked at before the best of them is asked for.
+const LOOKED_TOGETHER: usize = 16;
+
 /// Most alternatives that are reported.
 const ALTERNATIVES: usize = 3;
 
@@ -80,31 +83,56 @@ impl<'a> Field<'a> {
                 taken.iter().any(|t| exclude(t, effect))
             };
             let open = (0..self.candidates.len()).filter(|i| !excluded(*i));
-            let open: Vec<usize> = open.collect();
-            let part = watch.part("candidates", open.len());
-            let look = |candidate| {
-                part.step();
-                let gain = left_out.gain(self.terms_of(candidate));
-                RejectedCandidate { candidate, gain }
-            };
-            let looked: Vec<RejectedCandidate> = open.into_par_iter().map(look).collect();
-            drop(part);
             // at most a friction law for each joint, and so many effects besides
             let laws = taken.iter().filter(|e| is_friction_law(e)).count();
             let room = |effect: &ModelEffect| match is_friction_law(effect) {
                 true => laws < terms.weights.len(),
                 false => taken.len() - laws < self.numbers().effects,
             };
-            let next = match (watch.stop)() {
-                true => None,
-                false => self.best(&looked, &room),
-            };
+            let (next, looked) = self.round(open.collect(), &left_out, &room, watch);
             let Some(mut next) = next else {
                 return Ok((chosen, looked));
             };
             next.error = left_out.error();
             chosen.push(next);
         }
+    }
+
+    /// Looks at the open candidates, those first that gain most in the fit to all blocks, until no other can be the best
+    /// or say the same as it; at all where none is admissible, or the search is to end.
+    fn round(
+        &self,
+        open: Vec<usize>,
+        left_out: &BlocksLeftOut,
+        room: &dyn Fn(&ModelEffect) -> bool,
+        watch: DiagnosisWatch,
+    ) -> (Option<ChosenCandidate>, Vec<RejectedCandidate>) {
+        let part = watch.part("candidates", open.len());
+        let whole = left_out.whole_fit();
+        let gain_of_fit = |candidate: usize| {
+            let terms = self.terms_of(candidate);
+            let gain = whole.as_ref().map(|w| left_out.gain_of_fit(terms, w));
+            (gain.unwrap_or(f64::INFINITY), candidate)
+        };
+        let look = |&(_, candidate): &(f64, usize)| {
+            part.step();
+            let gain = left_out.gain(self.terms_of(candidate));
+            RejectedCandidate { candidate, gain }
+        };
+        let mut order: Vec<(f64, usize)> = open.into_par_iter().map(gain_of_fit).collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut next: Option<ChosenCandidate> = None;
+        let mut looked: Vec<RejectedCandidate> = Vec::new();
+        for group in order.chunks(LOOKED_TOGETHER) {
+            let least = next.as_ref().map(|n| self.numbers().looked * n.gain.value);
+            if least.is_some_and(|least| group[0].0 < least) || (watch.stop)() {
+                break;
+            }
+            looked.extend(group.par_iter().map(look).collect::<Vec<_>>());
+            next = self.best(&looked, room);
+        }
+        looked.sort_by_key(|l| l.candidate);
+        (next.filter(|_| !(watch.stop)()), looked)
     }
 
     /// Declared terms and those of candidates that were chosen, one behind the other.

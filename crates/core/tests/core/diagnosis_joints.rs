@@ -185,3 +185,17 @@ fn evidence_shows_the_residual_over_what_it_depends_on() {
     assert_eq!(breaks, 2);
     assert!((times[times.len() - 1] - times[0] - 2.0 * SECONDS).abs() < 5.0);
 }
+
+#[test]
+fn what_gains_little_in_a_fit_to_all_blocks_is_not_looked_at_and_the_choice_stays() {
+    let planted = |j: usize, _: f64, s: &[[f64; 3]]| match j {
+        1 => 0.4 * s[1][1].signum() * (s[0][0] + 0.3).sin() + 0.5 * (7.0 * s[1][0]).sin(),
+        _ => 0.6 * s[0][0] + 0.3 * s[0][1] * s[0][1].abs(),
+    };
+    let (mut case, found) = of(&level(), &planted);
+    assert!(found.steps.len() > 2, "{:?}", written(&found));
+    case.numbers.looked = 0.0;
+    let full = diagnosed(&case);
+    let said = |of: &Diagnosis| format!("{:?} {:?}", of.steps, of.candidates);
+    assert_eq!(said(&found), said(&full));
+}
