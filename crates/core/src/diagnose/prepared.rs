@@ -10,6 +10,7 @@ use super::memory::memory_s;
 use super::orders;
 use super::outcome::SplitErrors;
 use super::problem::case::DiagnosisCase;
+use super::problem::constant_columns::ConstantColumns;
 use super::problem::data_split::{DataSplit, LogRole, Piece};
 use super::problem::fit::{WeightedModel, fit};
 use super::problem::pass::{ColumnLayout, WeightedRows};
@@ -49,7 +50,7 @@ pub struct SummedProducts {
 impl<'a> PreparedCase<'a> {
     pub fn of(
         case: &'a DiagnosisCase,
-        split: &'a DataSplit,
+        (split, constant): (&'a DataSplit, &'a ConstantColumns),
         refit: &'a ModelRefit<'a>,
     ) -> Result<Self, DiagnoseError> {
         let numbers = &case.numbers;
@@ -58,6 +59,7 @@ impl<'a> PreparedCase<'a> {
             filters: &case.filters,
             split,
             rest_speed: &case.rest_speed,
+            constant: Some(constant),
         };
         let logs = split.logs(case.rows(), LogRole::Train);
         let whole = divide(&logs, f64::INFINITY, (1, 1)).list;

@@ -9,6 +9,7 @@ use super::outcome::JudgedEffects;
 use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, NotWritten, WhatIsLeft};
 use super::prepared::{PreparedCase, filtered, residuals};
 use super::problem::case::DiagnosisCase;
+use super::problem::constant_columns::ConstantColumns;
 use super::problem::data_split::{DataSplit, LogRole};
 use super::refit::ModelRefit;
 use super::searched::SearchedCase;
@@ -33,7 +34,8 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnoseError> {
     let split = case.split();
     check(case, &split)?;
-    let prepared = PreparedCase::of(case, &split, refit)?;
+    let constant = ConstantColumns::default();
+    let prepared = PreparedCase::of(case, (&split, &constant), refit)?;
     watch.unless_stopped()?;
     let searched = prepared.search(watch)?;
     watch.unless_stopped()?;

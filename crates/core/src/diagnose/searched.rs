@@ -54,25 +54,21 @@ impl PreparedCase<'_> {
             sums: BlockSums::default(),
             declared,
         };
-        summed.sums = self.passed(&summed, candidates, self.data.stretches)?;
+        summed.sums = self.passed(&summed, candidates, &self.data)?;
         Ok(summed)
     }
 
-    /// A pass over stretches for the same columns.
+    /// A pass over rows for the same columns.
     fn passed(
         &self,
         summed: &SummedProducts,
         candidates: &[EffectCandidate],
-        stretches: &[Stretch],
+        data: &WeightedRows,
     ) -> Result<BlockSums, MotionError> {
         let mut beside = summed.about.clone();
         beside.effects.extend_from_slice(&summed.directions);
         let columns = (&self.unknowns, candidates);
-        let data = WeightedRows {
-            stretches,
-            ..self.data
-        };
-        pass(&beside, columns, &summed.layout, &data, &self.blocks.list)
+        pass(&beside, columns, &summed.layout, data, &self.blocks.list)
     }
 
     /// The sums with as much noise again in the positions as they have, in the mean over both signs of it.
@@ -92,7 +88,12 @@ impl PreparedCase<'_> {
                 filter.with_added_noise(s, seed as u64, sign)
             });
             let noisy: Vec<Stretch> = noisy.collect::<Result<_, _>>()?;
-            self.passed(summed, &candidates, &noisy)
+            let data = WeightedRows {
+                stretches: &noisy,
+                constant: None,
+                ..self.data
+            };
+            self.passed(summed, &candidates, &data)
         };
         Ok(with(1.0)?.mean(&with(-1.0)?))
     }

@@ -7,9 +7,7 @@ use rayon::prelude::*;
 
 use super::term::{Factor, FormulaTerm, Function, Source};
 use crate::diagnose::prepared::PreparedCase;
-use crate::diagnose::problem::pass::{
-    EffectCandidate, LANES, Window, in_window, regressor, windows,
-};
+use crate::diagnose::problem::pass::{EffectCandidate, LANES, Window, in_window, windows};
 use crate::effect::{AugmentedModel, EffectScene, shifted};
 use crate::motion::MotionError;
 
@@ -110,8 +108,7 @@ impl PreparedCase<'_> {
         let windows = windows(data, blocks).into_iter();
         for (stretch, range) in windows.filter(|(s, _)| moving(*s)) {
             let window = Window::of(about, data, stretch, &range);
-            let mut regressor = regressor(about, unknowns, &window.part);
-            let own = window.rows_of(j, unknowns, candidates, &mut regressor[j])?;
+            let own = window.rows_of(j, unknowns, candidates)?;
             let made = columns.rows(&window, j)?;
             for (block, out) in blocks.iter().zip(&mut found) {
                 let rows = in_window(block, (stretch, &range), every);

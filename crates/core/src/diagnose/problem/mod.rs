@@ -2,6 +2,7 @@
 //! model.
 
 pub mod case;
+pub mod constant_columns;
 pub mod data_split;
 pub mod fit;
 pub mod formula_numbers;

@@ -6,15 +6,18 @@
 //! each other.
 
 use std::ops::Range;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::constant_columns::{ConstantColumns, ConstantRows};
 use super::data_split::DataSplit;
 use super::unknowns::{DiagnosisUnknowns, Unknown};
 use crate::effect::{AugmentedModel, EffectScene, ModelEffect, StretchTorques, shifted};
 use crate::judge::{BlockSums, Bound, Term, TimeBlock};
 use crate::motion::{FilterDesign, MotionError, ParallelFilters, Stretch};
+use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
 /// Channels that are filtered side by side.
@@ -36,6 +39,8 @@ pub struct WeightedRows<'a> {
     pub split: &'a DataSplit,
     /// Speed up to which each joint rests [m/s or rad/s].
     pub rest_speed: &'a [f64],
+    /// Columns that no model changes, of these very stretches.
+    pub constant: Option<&'a ConstantColumns>,
 }
 
 /// An effect at a place in one shape, with bounds of its coefficients; without any it has no columns.
@@ -226,6 +231,7 @@ pub struct Window<'a> {
     /// Samples, from the begin of the lead on.
     pub part: Stretch,
     torques: StretchTorques,
+    regressor: OnceLock<Vec<Vec<Vec<f64>>>>,
     /// Rows of the stretch that are wanted, and the row that the part begins with.
     range: Range<usize>,
     begin: usize,
@@ -246,6 +252,7 @@ impl<'a> Window<'a> {
         let part = stretch.part(begin * parallel.decimation, end);
         Window {
             torques: model.torques(&part),
+            regressor: OnceLock::new(),
             model,
             data,
             parallel,
@@ -276,35 +283,34 @@ impl<'a> Window<'a> {
         candidates: &[EffectCandidate],
         layout: &ColumnLayout,
     ) -> Result<Vec<DMatrix<f64>>, MotionError> {
-        let mut regressor = regressor(self.model, unknowns, &self.part);
-        let of_joint = |(j, regressor): (usize, &mut Vec<Vec<f64>>)| match self
-            .data
-            .split
-            .is_stationary(self.stretch, j)
-        {
+        let of_joint = |j: usize| match self.data.split.is_stationary(self.stretch, j) {
             true => Ok(DMatrix::zeros(0, layout.torques[j] + 2)),
-            false => self.rows_of(j, unknowns, candidates, regressor),
+            false => self.rows_of(j, unknowns, candidates),
         };
-        regressor.iter_mut().enumerate().map(of_joint).collect()
+        (0..layout.torques.len()).map(of_joint).collect()
     }
 
-    /// Rows of one joint, of which the regressor's columns are taken.
+    /// Rows of one joint: columns of the unknowns, of candidates, the torque and the residual.
     pub fn rows_of(
         &self,
         j: usize,
         unknowns: &DiagnosisUnknowns,
         candidates: &[EffectCandidate],
-        regressor: &mut [Vec<f64>],
     ) -> Result<DMatrix<f64>, MotionError> {
         let (model, part) = (self.model, &self.part);
         let scene = self.scene();
+        let own: Vec<Unknown> = (unknowns.columns[j].iter())
+            .map(|i| unknowns.of_column(*i))
+            .collect();
+        let constant = self.constant_rows(j, &own)?;
         let mut friction = friction_columns(&model.model.friction[j], &part.v[j]);
-        let column = |i: &usize| match unknowns.of_column(*i) {
-            Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
-            Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
-            Unknown::Offset(_) => vec![1.0; part.len()],
-        };
-        let mut raw: Vec<Vec<f64>> = unknowns.columns[j].iter().map(column).collect();
+        let mut raw: Vec<Vec<f64>> = (own.iter())
+            .filter_map(|unknown| match unknown {
+                Unknown::Friction { k, .. } => Some(std::mem::take(&mut friction[*k])),
+                _ => None,
+            })
+            .collect();
+        let constants = own.len() - raw.len();
         for candidate in candidates.iter().filter(|c| c.has_columns(j)) {
             raw.extend(candidate.columns(&scene, j));
         }
@@ -315,14 +321,54 @@ impl<'a> Window<'a> {
         let tau = &part.tau[j];
         raw.push(tau.clone());
         raw.push(tau.iter().zip(&hat).map(|(tau, hat)| tau - hat).collect());
-        let weights = self.weights(j);
-        let mut out = DMatrix::zeros(self.range.len(), raw.len());
-        for (first, group) in raw.chunks_mut(LANES).enumerate() {
-            for (l, rows) in self.kept(group, &weights)?.into_iter().enumerate() {
-                out.column_mut(LANES * first + l).copy_from_slice(&rows);
+        let width = constants + raw.len();
+        let changing = self.filtered(raw, &self.weights(j))?;
+        let mut changing = changing.iter();
+        let mut out = DMatrix::zeros(self.range.len(), width);
+        for (c, mut column) in out.column_iter_mut().enumerate() {
+            let same = own.get(c).and_then(|unknown| find(&constant, unknown));
+            if let Some(rows) = same.or_else(|| changing.next()) {
+                column.copy_from_slice(rows);
             }
         }
         Ok(out)
+    }
+
+    /// Rows of a joint's unknowns that no model changes; made once where the model shifts no torque in time.
+    fn constant_rows(
+        &self,
+        j: usize,
+        unknowns: &[Unknown],
+    ) -> Result<Arc<ConstantRows>, MotionError> {
+        let changes = |u: &&Unknown| matches!(u, Unknown::Friction { .. });
+        let wanted: Vec<Unknown> = unknowns.iter().filter(|u| !changes(u)).copied().collect();
+        let late = self.late(j);
+        let stored = self.data.constant.filter(|_| late == 0.0);
+        let window = (self.stretch, self.range.clone(), j);
+        if let Some(rows) = stored.and_then(|stored| stored.get(&window, &wanted)) {
+            return Ok(rows);
+        }
+        let column = |unknown: &Unknown| {
+            let mut column = match unknown {
+                Unknown::Theta(c) => self.regressor()[j][*c].clone(),
+                _ => vec![1.0; self.part.len()],
+            };
+            shifted(&mut column, late);
+            column
+        };
+        let raw = wanted.iter().map(column).collect();
+        let rows = self.filtered(raw, &self.weights(j))?;
+        let rows = Arc::new(wanted.into_iter().zip(rows).collect());
+        if let Some(stored) = stored {
+            stored.put(window, &rows);
+        }
+        Ok(rows)
+    }
+
+    /// Regressor of the inertial parameters, `[joint][parameter][sample]`.
+    fn regressor(&self) -> &[Vec<Vec<f64>>] {
+        let made = || regressor(&self.model.model.robot, &self.part);
+        self.regressor.get_or_init(made)
     }
 
     /// Samples by which the torque of a joint is late.
@@ -337,6 +383,19 @@ impl<'a> Window<'a> {
             // both sides of the model, where the joint stands or turns, weigh nothing before any filter
             _ => (self.parallel).weights(&self.part, j, self.data.rest_speed[j]),
         }
+    }
+
+    /// The rows that are wanted of any number of channels of weighed samples.
+    fn filtered(
+        &self,
+        mut raw: Vec<Vec<f64>>,
+        weights: &[f64],
+    ) -> Result<Vec<Vec<f64>>, MotionError> {
+        let mut rows = Vec::with_capacity(raw.len());
+        for group in raw.chunks_mut(LANES) {
+            rows.extend(self.kept(group, weights)?);
+        }
+        Ok(rows)
     }
 
     /// The rows that are wanted of some channels of weighed samples.
@@ -360,18 +419,15 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Regressor of the inertial parameters along a stretch, `[joint][parameter][sample]`; nothing where these are kept.
-pub fn regressor(
-    model: &AugmentedModel,
-    unknowns: &DiagnosisUnknowns,
-    stretch: &Stretch,
-) -> Vec<Vec<Vec<f64>>> {
-    let robot = &model.model.robot;
+/// Rows of an unknown among those that no model changes.
+fn find<'a>(rows: &'a ConstantRows, unknown: &Unknown) -> Option<&'a Vec<f64>> {
+    let own = rows.iter().find(|(own, _)| own == unknown);
+    own.map(|(_, rows)| rows)
+}
+
+/// Regressor of the inertial parameters along a stretch, `[joint][parameter][sample]`.
+fn regressor(robot: &Robot, stretch: &Stretch) -> Vec<Vec<Vec<f64>>> {
     let (n, p) = (robot.joints(), robot.parameters().len());
-    let theta = |u: &Unknown| matches!(u, Unknown::Theta(_));
-    if !unknowns.list.iter().chain(&unknowns.held).any(theta) {
-        return vec![Vec::new(); n];
-    }
     let samples = stretch.len();
     let mut out = vec![vec![vec![0.0; samples]; p]; n];
     let mut y = vec![0.0; n * p];
