@@ -10,6 +10,7 @@ use super::correction::{Change, Correction};
 use super::finding::ChannelKind::{self, Both, Position, Torque};
 use super::hypotheses::{LARGEST, round_numbers};
 use super::problem::Problem;
+use super::sum_waves::SumWaves;
 use super::trial::Trial;
 use super::weight::TWO_SIDED;
 
@@ -76,6 +77,49 @@ impl Free {
         }
     }
 
+    /// Values that are tried at first, no further from each other than a step.
+    fn grid(self) -> Vec<f64> {
+        let [low, high] = self.range();
+        match self {
+            Self::Factor(..) => {
+                let steps = (low / STEP).ceil() as i32..=(high / STEP).floor() as i32;
+                let steps = steps
+                    .map(|k| f64::from(k) * STEP)
+                    .filter(|x| low < *x && *x < high);
+                [low].into_iter().chain(steps).chain([high]).collect()
+            }
+            _ => {
+                let count = ((high - low) / STEP).ceil();
+                let values = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
+                values.collect()
+            }
+        }
+    }
+
+    /// The value that its rows go by: what it does to torques alone leaves them as they are, and positions on a motor's
+    /// side are those in another unit.
+    fn motion(self, x: f64) -> f64 {
+        match self {
+            Self::Factor(Torque, _) => 0.0,
+            Self::Factor(Both, _) => -x,
+            _ => x,
+        }
+    }
+
+    /// Whether rows that go by a value of one are those of the other.
+    fn share_motions(&self, other: &Self) -> bool {
+        matches!((self, other), (Self::Factor(Position, a), Self::Factor(Both, b)) if a == b)
+    }
+
+    /// Waves of its value that products of rows consist of: a row has two of an angle. None of what is no angle.
+    fn waves(self) -> Option<usize> {
+        match self {
+            Self::Zero(_) | Self::Begins(_) => Some(4),
+            Self::Lean(_) => Some(2),
+            Self::Factor(..) => None,
+        }
+    }
+
     /// What these joints may have beside the list; positions of those in `asked`, whatever is missed.
     fn all(problem: &Problem, joints: &[usize], errors: &[f64], asked: &[usize]) -> Vec<Free> {
         let mut out = Vec::new();
@@ -125,38 +169,66 @@ pub(super) fn estimates(
     problem: &Problem,
     base: &Correction,
     (joints, asked): (&[usize], &[usize]),
-    (few, whole): (&Trial, &Trial),
+    both: (&Trial, &Trial),
 ) -> Vec<SetupEstimate> {
-    let cases = Free::all(problem, joints, &whole.errors(), asked);
-    let of = |free: &Free| best(problem, base, *free, (few, whole));
-    cases.par_iter().filter_map(of).collect()
+    let cases = Free::all(problem, joints, &both.1.errors(), asked);
+    let groups: Vec<&[Free]> = cases.chunk_by(Free::share_motions).collect();
+    let of = |group: &&[Free]| -> Vec<SetupEstimate> {
+        let nearest = nearest(problem, base, group);
+        let pairs = group.iter().zip(nearest);
+        let refined = |(free, x): (&Free, Option<f64>)| refined(problem, base, (*free, x?), both);
+        pairs.filter_map(refined).collect()
+    };
+    groups.par_iter().flat_map_iter(of).collect()
 }
 
-fn best(
-    problem: &Problem,
-    base: &Correction,
-    free: Free,
-    (few, whole): (&Trial, &Trial),
-) -> Option<SetupEstimate> {
-    let every = problem.few();
-    let [low, high] = free.range();
-    let count = ((high - low) / STEP).ceil();
-    let grid = (0..=count as usize).map(|k| low + (high - low) * k as f64 / count);
-    // by what the steps that follow go down, and the nearest to the declared set-up of equals: it is tried first
-    let mut grid: Vec<f64> = grid.collect();
-    grid.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    let mut best: Option<(f64, f64)> = None;
-    for x in grid {
-        let change = free.change(problem, x);
-        let most = best.map_or(f64::INFINITY, |best| best.0);
-        let score = Trial::least(problem, (base, Some(&change)), (every, most), &[few]);
-        if let Some(score) = score.filter(|score| *score < most) {
-            best = Some((score, x));
+/// The value of a grid that leaves least, of each of some that move the rows alike.
+fn nearest(problem: &Problem, base: &Correction, group: &[Free]) -> Vec<Option<f64>> {
+    let of_free = |(i, free): (usize, &Free)| {
+        let free = *free;
+        (free.grid().into_iter()).map(move |x| (free.motion(x), x, i))
+    };
+    let mut grid: Vec<(f64, f64, usize)> = group.iter().enumerate().flat_map(of_free).collect();
+    // the nearest to the declared set-up of equals is tried first
+    grid.sort_by(|(a, x, _), (b, y, _)| x.abs().total_cmp(&y.abs()).then(a.total_cmp(b)));
+    let correction = |free: Free, x: f64| base.with(&free.change(problem, x));
+    let waves = match group {
+        [free] => free.waves(),
+        _ => None,
+    };
+    let wave = waves.and_then(|waves| {
+        SumWaves::new(waves, |x| {
+            problem.sums(&correction(group[0], x), problem.few())
+        })
+    });
+    let mut best = vec![(f64::INFINITY, None); group.len()];
+    for of_motion in grid.chunk_by(|a, b| a.0 == b.0) {
+        let (_, x, i) = of_motion[0];
+        let sums = match &wave {
+            Some(wave) => Some(wave.at(x)),
+            None => problem.sums(&correction(group[i], x), problem.few()),
+        };
+        let Some(sums) = sums else { continue };
+        for &(_, x, i) in of_motion {
+            let score = Trial::least(problem, &correction(group[i], x), &sums);
+            if let Some(score) = score.filter(|score| *score < best[i].0) {
+                best[i] = (score, Some(x));
+            }
         }
     }
-    let (_, mut x) = best?;
+    best.into_iter().map(|(_, x)| x).collect()
+}
+
+/// The best value from a near one on, where it takes off what a mistake does.
+fn refined(
+    problem: &Problem,
+    base: &Correction,
+    (free, mut x): (Free, f64),
+    (few, whole): (&Trial, &Trial),
+) -> Option<SetupEstimate> {
+    let [low, high] = free.range();
     let change = free.change(problem, x);
-    let rows = (every, f64::INFINITY);
+    let rows = (problem.few(), f64::INFINITY);
     let found = Trial::new(problem, (base, Some(&change)), rows, &[few])?;
     let own = free.joint().map(|j| vec![j]);
     let own = own.unwrap_or_else(|| problem.channels_that_move());

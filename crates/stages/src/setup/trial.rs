@@ -8,7 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use super::LIMITS;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
-use super::problem::{Problem, Rows, RowsSoFar};
+use super::problem::Problem;
+use super::rows::{RowSums, Rows};
 use cft_ident_core::judge::{
     ErrorGain, FitToAll, NUMBERS, Term, Terms, agreement_on_share, compare,
 };
@@ -62,7 +63,7 @@ impl Mixed {
                 let first = same.first().filter(|_| joints && most.is_finite());
                 let weights = first.map(|same| weights(problem, &same.rows.total, &mix));
                 let mut expected = 0.0;
-                let mut is_hopeless = |part: &RowsSoFar| {
+                let mut is_hopeless = |part: &RowSums| {
                     let Some(weights) = &weights else {
                         return false;
                     };
@@ -158,14 +159,11 @@ impl Trial {
         })
     }
 
-    /// The whole error of such a fit to all its blocks; none where there is none, or where it is surely above `most`.
-    pub fn least(
-        problem: &Problem,
-        change: (&Correction, Option<&Change>),
-        rows: (usize, f64),
-        same: &[&Trial],
-    ) -> Option<f64> {
-        Mixed::new(problem, change, rows, same)?.fit().least()
+    /// The whole error that a fit of a correction leaves of all rows of these sums; none where it finds nothing.
+    pub fn least(problem: &Problem, by: &Correction, rows: &RowSums) -> Option<f64> {
+        let mix = problem.channels.mix(by);
+        let terms = terms(&rows.terms, weights(problem, &rows.sums, &mix));
+        FitToAll::new(&rows.sums, &mix, &terms).least()
     }
 
     /// Errors of each block by the fit of a change to all rows, all joints together.

@@ -6,7 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{JointTable, Problem};
+use super::problem::Problem;
+use super::rows::JointTable;
 use super::trial::Trial;
 use crate::setup::channels::Drive;
 use cft_ident_core::inertia::columns::JointTerm;
