@@ -11,7 +11,7 @@
 //! what the filter itself took for the first power and 1.8 times for the second: about the smear, in either case. The
 //! same filter a second time would not show it, for its pass band is flat and its edge steep.
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,9 @@ use super::position_filter::HIGHEST_SHARE;
 use super::settings::{FilterDesign, FilterSettings};
 use super::stretch::Stretch;
 use super::{MotionError, rest};
+use crate::math::kept::{KeptRows, KeptWork};
+use crate::math::zero_phase::run_each;
+use crate::robot::friction::{DoubleTanh, sign};
 
 /// Cut-offs that are tried, over that of the parallel filter; a lower one would take from the band that is kept.
 const TRIED: [f64; 7] = [4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0];
@@ -69,6 +72,24 @@ pub fn candidates(settings: &FilterSettings, rate_hz: f64) -> Vec<f64> {
     found
 }
 
+/// The friction of a joint where it reverses; what is linear in the velocity counts for nothing.
+#[derive(Debug, Clone, Copy)]
+pub enum ReversalFriction {
+    /// Coulomb friction of this level \[N or N m\].
+    Jump(f64),
+    Smooth(DoubleTanh),
+}
+
+impl ReversalFriction {
+    #[inline]
+    fn torque(&self, v: f64) -> f64 {
+        match self {
+            Self::Jump(level) => level * sign(v),
+            Self::Smooth(law) => law.torque(v),
+        }
+    }
+}
+
 /// Squares of one joint under one cut-off.
 #[derive(Debug, Clone, Copy, Default)]
 struct CutoffSquares {
@@ -86,11 +107,10 @@ struct CutoffSquares {
 pub struct CutoffTrial<'a> {
     settings: &'a FilterSettings,
     cutoffs_hz: Vec<f64>,
-    /// Friction of a joint at a velocity; only what is not linear in it counts.
-    friction: &'a (dyn Fn(usize, f64) -> f64 + Sync),
+    laws: Vec<ReversalFriction>,
     /// Speed up to which each joint rests [m/s or rad/s].
     rest_speed: &'a [f64],
-    /// `[joint][cut-off]`
+    /// `[cut-off][joint]`
     squares: Vec<Vec<CutoffSquares>>,
 }
 
@@ -99,14 +119,14 @@ impl<'a> CutoffTrial<'a> {
     pub fn new(
         settings: &'a FilterSettings,
         cutoffs_hz: Vec<f64>,
-        friction: &'a (dyn Fn(usize, f64) -> f64 + Sync),
+        laws: Vec<ReversalFriction>,
         rest_speed: &'a [f64],
     ) -> Self {
         CutoffTrial {
             settings,
-            squares: vec![vec![CutoffSquares::default(); cutoffs_hz.len()]; rest_speed.len()],
+            squares: vec![vec![CutoffSquares::default(); laws.len()]; cutoffs_hz.len()],
             cutoffs_hz,
-            friction,
+            laws,
             rest_speed,
         }
     }
@@ -132,27 +152,15 @@ impl<'a> CutoffTrial<'a> {
         if designs.iter().flatten().any(|d| kept < shortest(d)) {
             return Ok(());
         }
-        let (friction, rest_speed) = (self.friction, self.rest_speed);
-        self.squares
-            .par_iter_mut()
-            .enumerate()
-            .try_for_each(|(joint, squares)| {
-                let one = OneJoint {
-                    joint,
-                    stretch,
-                    edge,
-                    friction: &|v| friction(joint, v),
-                    rest_speed: rest_speed[joint],
-                };
-                let Some([first, _]) = designs.first() else {
-                    return Ok(());
-                };
-                let moves = one.moves(first)?;
-                for (design, sum) in designs.iter().zip(squares) {
-                    one.add(design, &moves, sum)?;
-                }
-                Ok(())
-            })
+        let Some([first, _]) = designs.first() else {
+            return Ok(());
+        };
+        let joints = JointsAbreast::new((&self.laws, self.rest_speed), stretch, edge);
+        let moves = joints.moves(first)?;
+        let of_design =
+            |(design, sums): (_, &mut Vec<CutoffSquares>)| joints.add(design, &moves, sums);
+        let pairs = designs.par_iter().zip(&mut self.squares);
+        pairs.try_for_each(of_design)
     }
 
     /// The cut-off that costs each joint least \[Hz\]; `plain` where the logs determine none.
@@ -173,11 +181,12 @@ impl<'a> CutoffTrial<'a> {
                 false => 0.0,
             },
         };
-        let of_joint = |squares: &Vec<CutoffSquares>| {
-            let pairs = self.cutoffs_hz.iter().zip(squares);
+        let of_joint = |j: usize| {
+            let pairs = self.cutoffs_hz.iter().zip(&self.squares);
+            let pairs = pairs.map(|(hz, squares)| (hz, &squares[j]));
             pairs.filter(|(_, s)| s.rows > 0).map(cost).collect()
         };
-        self.squares.iter().map(of_joint).collect()
+        (0..self.laws.len()).map(of_joint).collect()
     }
 }
 
@@ -188,75 +197,149 @@ pub fn least(costs: &[CutoffCost]) -> Option<CutoffCost> {
     found.filter(|cost| cost.total() > 0.0)
 }
 
-/// One joint of a stretch.
-struct OneJoint<'a> {
-    joint: usize,
-    stretch: &'a Stretch,
+/// Channels of each joint in the rows of a trial: what the narrower filter changes in its friction, what more noise
+/// changes in it with either sign, the acceleration that the noise makes, and the whole acceleration.
+const CHANNELS: usize = 5;
+
+/// All joints of a stretch side by side, `samples x joints`: a filter takes as long for one as for all.
+struct JointsAbreast<'a> {
+    laws: &'a [ReversalFriction],
+    rest_speed: &'a [f64],
+    dt: f64,
     /// Samples at each end in which the narrowest filter has not settled.
     edge: usize,
-    friction: &'a (dyn Fn(f64) -> f64 + Sync),
-    rest_speed: f64,
+    /// Positions through no filter.
+    q: Vec<f64>,
+    /// White noise of positions, even over an interval of 1.
+    noise: Vec<f64>,
 }
 
-impl OneJoint<'_> {
-    fn inner<'x>(&self, channel: &'x [f64]) -> &'x [f64] {
-        &channel[self.edge..channel.len() - self.edge]
+impl<'a> JointsAbreast<'a> {
+    fn new(
+        (laws, rest_speed): (&'a [ReversalFriction], &'a [f64]),
+        stretch: &Stretch,
+        edge: usize,
+    ) -> Self {
+        let (n, samples) = (laws.len(), stretch.len());
+        let [mut q, mut noise] = [(); 2].map(|()| vec![0.0; n * samples]);
+        for j in 0..n {
+            let mut chance = ChaCha8Rng::seed_from_u64(j as u64);
+            let rows = q.chunks_exact_mut(n).zip(noise.chunks_exact_mut(n));
+            for ((q, noise), x) in rows.zip(&stretch.q[j]) {
+                q[j] = *x;
+                noise[j] = chance.random::<f64>() - 0.5;
+            }
+        }
+        Self {
+            laws,
+            rest_speed,
+            dt: stretch.dt,
+            edge,
+            q,
+            noise,
+        }
     }
 
-    /// Velocity and acceleration through the position filter of a design.
-    fn smoothed(&self, design: &FilterDesign) -> Result<[Vec<f64>; 2], MotionError> {
-        let q = self.stretch.q[self.joint].clone();
-        let [_, v, a] = design.motion_of(self.joint, q, self.stretch.dt)?;
+    /// Velocity and acceleration of positions through the position filter of a design.
+    fn motion(&self, design: &FilterDesign, q: &[f64]) -> Result<[Vec<f64>; 2], MotionError> {
+        let n = self.laws.len();
+        let mut q = q.to_vec();
+        if let Some(filter) = &design.position {
+            run_each(|j| filter.of(j), &mut q, n)?;
+        }
+        let [mut v, mut a] = [(); 2].map(|()| vec![0.0; q.len()]);
+        (design.differences).apply(&q, n, self.dt, &mut v, &mut a);
         Ok([v, a])
     }
 
-    /// Whether the joint moves in each row.
-    fn moves(&self, design: &FilterDesign) -> Result<Vec<bool>, MotionError> {
-        let [v, _] = self.smoothed(design)?;
-        let speeds = self.inner(&v).iter();
-        let moving: Vec<f64> = speeds
-            .map(|v| rest::movement(*v, self.rest_speed))
-            .collect();
-        let rows = design.run(&[&moving])?;
-        Ok(rows[0].iter().map(|m| !rest::rests(*m)).collect())
+    /// Filtered rows of channels, without the edges; `fill` writes those of a sample.
+    fn rows(
+        &self,
+        design: &FilterDesign,
+        channels: usize,
+        fill: impl Fn(usize, &mut [f64]),
+    ) -> Result<Vec<f64>, MotionError> {
+        let samples = self.q.len() / self.laws.len() - 2 * self.edge;
+        let rows = KeptRows {
+            samples,
+            channels,
+            first: design.trim,
+            kept: design.rows(samples),
+        };
+        let mut fill = |k: usize, row: &mut [f64]| fill(k + self.edge, row);
+        let rows = design.kept.run(rows, &mut KeptWork::default(), &mut fill);
+        Ok(rows?)
     }
 
+    /// Whether each joint moves in each row, row by row.
+    fn moves(&self, design: &FilterDesign) -> Result<Vec<bool>, MotionError> {
+        let n = self.laws.len();
+        let [v, _] = self.motion(design, &self.q)?;
+        let rows = self.rows(design, n, |k, row| {
+            let speeds = v[k * n..].iter().zip(self.rest_speed);
+            for (to, (v, rest_speed)) in row.iter_mut().zip(speeds) {
+                *to = rest::movement(*v, *rest_speed);
+            }
+        })?;
+        Ok(rows.iter().map(|m| !rest::rests(*m)).collect())
+    }
+
+    /// Level of each joint's noise by its acceleration, beside that of white noise of interval 1.
+    fn noise_levels(&self, design: &FilterDesign, [a, noise]: [&[f64]; 2]) -> Vec<f64> {
+        let n = self.laws.len();
+        let level = |j: usize| {
+            let lag = design.rough_lag(j, self.dt);
+            let [a, noise] = [a, noise].map(|x| {
+                let inner = &x[self.edge * n..x.len() - self.edge * n];
+                let own: Vec<f64> = inner.iter().skip(j).step_by(n).copied().collect();
+                middle_roughness(&own, lag)
+            });
+            let level = a / noise;
+            if level.is_finite() { level } else { 0.0 }
+        };
+        (0..n).map(level).collect()
+    }
+
+    /// Adds what a cut-off costs each joint in the rows in which it moves.
     fn add(
         &self,
         [design, narrower]: &[FilterDesign; 2],
         moves: &[bool],
-        sum: &mut CutoffSquares,
+        sums: &mut [CutoffSquares],
     ) -> Result<(), MotionError> {
-        let [v, a] = self.smoothed(design)?;
+        let n = self.laws.len();
+        let [v, a] = self.motion(design, &self.q)?;
         let mut again = v.clone();
         if let Some(filter) = &narrower.position {
-            filter.of(self.joint).run(&mut again, 1)?;
+            run_each(|j| filter.of(j), &mut again, n)?;
         }
-        let mut chance = ChaCha8Rng::seed_from_u64(self.joint as u64);
-        let [_, noise_v, noise_a] =
-            design.motion_of_noise(self.joint, self.stretch, &mut chance)?;
-        let lag = design.rough_lag(self.joint, self.stretch.dt);
-        let level =
-            middle_roughness(self.inner(&a), lag) / middle_roughness(self.inner(&noise_a), lag);
-        let level = if level.is_finite() { level } else { 0.0 };
-        let f = self.friction;
-        let channel = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            (self.edge..v.len() - self.edge).map(of).collect()
-        };
-        let here: Vec<f64> = v.iter().map(|v| f(*v)).collect();
-        let smear = channel(&|k| here[k] - f(again[k]));
-        let more = channel(&|k| f(v[k] + level * noise_v[k]) - here[k]);
-        let less = channel(&|k| f(v[k] - level * noise_v[k]) - here[k]);
-        let shaken = channel(&|k| level * noise_a[k]);
-        let acceleration = channel(&|k| a[k]);
-        let rows = design.run(&[&smear, &more, &less, &shaken, &acceleration])?;
-        for (row, _) in moves.iter().enumerate().filter(|(_, moves)| **moves) {
-            sum.change += rows[0][row].powi(2);
-            sum.noise += 0.5 * (rows[1][row].powi(2) + rows[2][row].powi(2));
-            sum.step += level * level;
-            sum.shaken += rows[3][row].powi(2);
-            sum.acceleration += rows[4][row].powi(2);
-            sum.rows += 1;
+        let [noise_v, noise_a] = self.motion(design, &self.noise)?;
+        let levels = self.noise_levels(design, [&a, &noise_a]);
+        let rows = self.rows(design, CHANNELS * n, |k, row| {
+            for (j, to) in row.chunks_exact_mut(CHANNELS).enumerate() {
+                let (i, law) = (k * n + j, &self.laws[j]);
+                let shake = levels[j] * noise_v[i];
+                let here = law.torque(v[i]);
+                to.copy_from_slice(&[
+                    here - law.torque(again[i]),
+                    law.torque(v[i] + shake) - here,
+                    law.torque(v[i] - shake) - here,
+                    levels[j] * noise_a[i],
+                    a[i],
+                ]);
+            }
+        })?;
+        for (row, moves) in rows.chunks_exact(CHANNELS * n).zip(moves.chunks_exact(n)) {
+            let joints = row.chunks_exact(CHANNELS).zip(moves).enumerate();
+            for (j, (row, _)) in joints.filter(|(_, (_, moves))| **moves) {
+                let sum = &mut sums[j];
+                sum.change += row[0].powi(2);
+                sum.noise += 0.5 * (row[1].powi(2) + row[2].powi(2));
+                sum.step += levels[j] * levels[j];
+                sum.shaken += row[3].powi(2);
+                sum.acceleration += row[4].powi(2);
+                sum.rows += 1;
+            }
         }
         Ok(())
     }
@@ -304,18 +387,29 @@ mod tests {
     }
 
     fn costs(q: &[f64]) -> Vec<CutoffCost> {
+        costs_of_each(&[q]).remove(0)
+    }
+
+    fn costs_of_each(q: &[&[f64]]) -> Vec<Vec<CutoffCost>> {
         let settings = FilterSettings::default();
-        let friction = |_: usize, v: f64| (SLOPE * v).tanh();
+        let friction = ReversalFriction::Smooth(DoubleTanh {
+            viscous: 0.0,
+            coulomb_1: 1.0,
+            coulomb_2: 0.0,
+            slope_1: SLOPE,
+            slope_2: 1.0,
+        });
         let tried = candidates(&settings, 1.0 / DT);
-        let mut trial = CutoffTrial::new(&settings, tried, &friction, &[1e-3]);
+        let rest = vec![1e-3; q.len()];
+        let mut trial = CutoffTrial::new(&settings, tried, vec![friction; q.len()], &rest);
         let stretch = Stretch {
             dt: DT,
-            t: (0..q.len()).map(|k| k as f64 * DT).collect(),
-            q: vec![q.to_vec()],
+            t: (0..q[0].len()).map(|k| k as f64 * DT).collect(),
+            q: q.iter().map(|q| q.to_vec()).collect(),
             ..Stretch::default()
         };
         trial.add(&stretch).unwrap();
-        trial.costs().remove(0)
+        trial.costs()
     }
 
     #[test]
@@ -369,6 +463,18 @@ mod tests {
             let least = each.fold(f64::INFINITY, f64::min);
             assert!(chosen < 1.6 * least, "{period}: {chosen} {least}");
         }
+    }
+
+    #[test]
+    fn a_joint_beside_others_costs_what_it_costs_alone_and_one_at_rest_nothing() {
+        let [slow, _, _] = swing(6.0, 0.3);
+        let [quick, _, _] = swing(1.2, 0.3);
+        let alone = costs(&slow);
+        let still = vec![0.1; slow.len()];
+        let all = costs_of_each(&[&slow, &quick, &still]);
+        assert_eq!(all[0], alone);
+        assert!(least(&all[1]).unwrap().cutoff_hz > least(&all[0]).unwrap().cutoff_hz);
+        assert!(all[2].is_empty(), "{:?}", all[2]);
     }
 
     #[test]

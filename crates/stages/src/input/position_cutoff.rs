@@ -16,9 +16,10 @@ use crate::note::{FitNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::inertia::solve::Fit;
-use cft_ident_core::motion::position_cutoff::{CutoffCost, CutoffTrial, candidates, least};
+use cft_ident_core::motion::position_cutoff::{
+    CutoffCost, CutoffTrial, ReversalFriction, candidates, least,
+};
 use cft_ident_core::motion::{FilterSettings, RunError, Stretch, stretches};
-use cft_ident_core::robot::friction::sign;
 use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_files::config::held_out::HeldOut;
 use cft_ident_logs::log::Block;
@@ -190,6 +191,9 @@ impl RobotSetup {
         together: &RobotSetup,
         control: &Control,
     ) -> Result<Vec<FilterSettings>, IdentifyError> {
+        if logs.len() == 1 {
+            return Ok(vec![together.settings()]);
+        }
         let of_log = |log: &LogData| {
             let log = std::slice::from_ref(log);
             let mut setup = self.clone();
@@ -342,14 +346,15 @@ impl RobotSetup {
         };
         // Viscous friction is linear in the velocity and prefers no cut-off: a model finds the cut-offs of its own fit, where
         // the Coulomb level was not known yet.
-        let friction = |j: usize, v: f64| match laws.get(j) {
+        let friction = |j: usize| match laws.get(j) {
             Some(Some(JointFriction::ViscousCoulomb(law))) if law.coulomb != 0.0 => {
-                law.coulomb * sign(v)
+                ReversalFriction::Jump(law.coulomb)
             }
-            Some(Some(JointFriction::DoubleTanh(law))) => law.torque(v),
-            _ => sign(v),
+            Some(Some(JointFriction::DoubleTanh(law))) => ReversalFriction::Smooth(*law),
+            _ => ReversalFriction::Jump(1.0),
         };
-        let mut trial = CutoffTrial::new(&settings, tried, &friction, rest_speed);
+        let friction = (0..n).map(friction).collect();
+        let mut trial = CutoffTrial::new(&settings, tried, friction, rest_speed);
         for stretch in &all {
             trial
                 .add(stretch)

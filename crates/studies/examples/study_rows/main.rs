@@ -20,7 +20,7 @@ use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
 use cft_ident::inertia::solve::{Fit, RowWeighting, fit};
 use cft_ident::inertia::{accumulate, add_processing};
 use cft_ident::log::Block;
-use cft_ident::motion::position_cutoff::{CutoffTrial, candidates};
+use cft_ident::motion::position_cutoff::{CutoffTrial, ReversalFriction, candidates};
 use cft_ident::motion::{FilterDesign, FilterSettings, Stretch, ZeroOrderHold, full_rate, rest};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{LaboratorySetup, ParameterStructure};
@@ -121,9 +121,9 @@ impl Driven {
             q: (0..4).map(column).collect(),
             ..Stretch::default()
         };
-        let friction = |j: usize, v: f64| laws[j].torque(v);
+        let friction = laws.map(ReversalFriction::Smooth).to_vec();
         let tried = candidates(&settings, 1.0 / DT);
-        let mut trial = CutoffTrial::new(&settings, tried, &friction, &self.rest);
+        let mut trial = CutoffTrial::new(&settings, tried, friction, &self.rest);
         trial.add(&raw).expect("the rate carries them");
         FilterSettings {
             joint_q_cutoffs_hz: trial.chosen(settings.plain_q_cutoff_hz(1.0 / DT)),
