@@ -8,8 +8,8 @@ use cft_ident::cli;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
     self, AcceptedSetup, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings,
-    IdentifyError, LogData, LsqSettings, ReducedLogs, RobotSetup, RobotSources, SetupRefusal,
-    TrackSource, ValidateSettings, accepted_setup,
+    IdentifyError, LsqSettings, ReducedLogs, RobotSetup, RobotSources, SetupRefusal, TrackSource,
+    ValidateSettings, accepted_setup,
 };
 use cft_ident::number;
 use cft_ident::report::json::{JsonDocument, NO_WARNINGS};

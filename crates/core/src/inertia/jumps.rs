@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::accumulate::{BlockFactor, BlockFactors};
 use super::columns::JointTerm;
 use super::solution::FitError;
-use super::solve::{Fit, RowWeighting, fit};
+use super::solve::weighted_unknowns;
 
 /// Numbers that decide what a jump is.
 struct Limits {
@@ -42,35 +42,34 @@ pub struct ResidualJump {
 }
 
 /// The stretches of a log in which at least two joints jump; none of a single joint, whose torque has other reasons.
+/// The blocks that are fitted leave their place for it and are put back.
 ///
 /// # Errors
 /// [`FitError`].
-pub fn jumps(factors: &BlockFactors) -> Result<Vec<ResidualJump>, FitError> {
-    let usable = |b: &&BlockFactor| b.span[1] > b.span[0] && b.scores.is_none();
-    let blocks: Vec<&BlockFactor> = factors.blocks.iter().filter(usable).collect();
-    if factors.columns.joints < 2 || blocks.len() < LIMITS.blocks {
+pub fn jumps(factors: &mut BlockFactors) -> Result<Vec<ResidualJump>, FitError> {
+    let usable = |b: &BlockFactor| b.span[1] > b.span[0] && b.scores.is_none();
+    let places = (0..factors.blocks.len()).filter(|k| usable(&factors.blocks[*k]));
+    let places: Vec<usize> = places.collect();
+    if factors.columns.joints < 2 || places.len() < LIMITS.blocks {
         return Ok(Vec::new());
     }
-    let mut kept: Vec<BlockFactor> = blocks.iter().copied().cloned().collect();
+    let mut kept = places.clone();
     let (mut ratios, mut usual) = (Vec::new(), Vec::new());
     let mut theta = DVector::zeros(0);
     for round in 0..=LIMITS.rounds {
-        let part = BlockFactors {
-            blocks: std::mem::take(&mut kept),
-            ..factors.without_blocks()
-        };
-        let found = fit(&part, RowWeighting::Wls)?;
-        (ratios, usual) = over_usual(factors, &blocks, &found);
-        theta = found.theta;
+        let found = fit_blocks(factors, &kept)?;
+        let blocks = places.iter().map(|k| &factors.blocks[*k]);
+        (ratios, usual) = over_usual(factors, &blocks.collect::<Vec<_>>(), &found);
+        theta = found.0;
         if round == LIMITS.rounds {
             break;
         }
         let worst = |of: &Vec<f64>| of.iter().copied().fold(0.0, f64::max);
-        let mut order: Vec<usize> = (0..blocks.len()).collect();
+        let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_by(|a, b| worst(&ratios[*a]).total_cmp(&worst(&ratios[*b])));
-        order.truncate((LIMITS.fitted * blocks.len() as f64) as usize);
+        order.truncate((LIMITS.fitted * places.len() as f64) as usize);
         order.sort_unstable();
-        kept = order.iter().map(|k| blocks[*k].clone()).collect();
+        kept = order.iter().map(|k| places[*k]).collect();
     }
     let friction = |j: usize| BY_FRICTION * coulomb(factors, &theta, j);
     let friction: Vec<f64> = (0..usual.len()).map(friction).collect();
@@ -80,7 +79,25 @@ pub fn jumps(factors: &BlockFactors) -> Result<Vec<ResidualJump>, FitError> {
             ratios.fill(0.0);
         }
     }
+    let blocks: Vec<&BlockFactor> = places.iter().map(|k| &factors.blocks[*k]).collect();
     Ok(joined(&blocks, &ratios))
+}
+
+/// Unknowns by the blocks at some places alone, and their covariance.
+fn fit_blocks(
+    factors: &mut BlockFactors,
+    places: &[usize],
+) -> Result<(DVector<f64>, DMatrix<f64>), FitError> {
+    let mut part = factors.without_blocks();
+    let taken = places
+        .iter()
+        .map(|k| std::mem::take(&mut factors.blocks[*k]));
+    part.blocks = taken.collect();
+    let found = weighted_unknowns(&part);
+    for (k, block) in places.iter().zip(part.blocks) {
+        factors.blocks[*k] = block;
+    }
+    found
 }
 
 /// Coulomb levels that a joint's torque may be off by where it sticks or turns; a push leaves more at one joint.
@@ -98,16 +115,16 @@ fn coulomb(factors: &BlockFactors, theta: &DVector<f64>, j: usize) -> f64 {
 fn over_usual(
     factors: &BlockFactors,
     blocks: &[&BlockFactor],
-    fit: &Fit,
+    (theta, covariance): &(DVector<f64>, DMatrix<f64>),
 ) -> (Vec<Vec<f64>>, Vec<f64>) {
     let n = factors.columns.joints;
     let mut all = vec![vec![0.0; n]; blocks.len()];
     let mut usual = vec![0.0; n];
     for j in 0..n {
-        let own = factors.own_unknowns(&fit.theta, j);
+        let own = factors.own_unknowns(theta, j);
         let place = |c: usize| factors.columns.unknown(j, c);
         let covariance = DMatrix::from_fn(own.len(), own.len(), |a, b| {
-            fit.covariance[(place(a), place(b))]
+            covariance[(place(a), place(b))]
         });
         let mut seen = Vec::with_capacity(blocks.len());
         let mut uncertain = vec![0.0; blocks.len()];
@@ -215,7 +232,7 @@ mod tests {
             rows.at(t);
             rows.add(0, 0.01, &out);
         }
-        jumps(&rows.finish()).unwrap()
+        jumps(&mut rows.finish()).unwrap()
     }
 
     #[test]

@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::accumulate::{BlockFactors, JointRows, RelativeResidual};
 use super::covariance::{FitCovariances, covariance};
 use super::solution::{
-    ConditionNumbers, ConfoundedUnknowns, FitError, FitInputs, conditions, joints, residual_std,
-    solve, stacked,
+    ConditionNumbers, ConfoundedUnknowns, FitError, FitInputs, WeightedSolution, conditions,
+    joints, residual_std, solve, stacked,
 };
 
 /// Which rows count how much.
@@ -59,16 +59,32 @@ pub struct Fit {
 /// [`FitError`].
 pub fn fit(factors: &BlockFactors, estimator: RowWeighting) -> Result<Fit, FitError> {
     let joints = joints(factors)?;
-    let mut weights = vec![1.0; factors.columns.joints];
-    if estimator == RowWeighting::Wls {
-        // noise of each joint from the step before; two steps settle it
-        for _ in 0..2 {
-            let theta = solve(factors, &joints, &weights, None)?.theta;
-            weights = weights_of(factors, &residual_std(factors, &joints, &theta));
-        }
-    }
+    let weights = match estimator {
+        RowWeighting::Wls => settled_weights(factors, &joints)?,
+        RowWeighting::Ols => vec![1.0; factors.columns.joints],
+    };
     let inputs = FitInputs::weighted(&weights, None);
     finish(factors, &joints, inputs)
+}
+
+/// The unknowns of a weighted fit and their covariance, and nothing of what its columns are like.
+pub(super) fn weighted_unknowns(
+    factors: &BlockFactors,
+) -> Result<(DVector<f64>, DMatrix<f64>), FitError> {
+    let joints = joints(factors)?;
+    let weights = settled_weights(factors, &joints)?;
+    let found = SolvedRows::new(factors, &joints, FitInputs::weighted(&weights, None))?;
+    Ok((found.solution.theta, found.covariances.total))
+}
+
+/// Weight of each joint's rows by the noise of the step before; two steps settle it.
+fn settled_weights(factors: &BlockFactors, joints: &[DMatrix<f64>]) -> Result<Vec<f64>, FitError> {
+    let mut weights = vec![1.0; factors.columns.joints];
+    for _ in 0..2 {
+        let theta = solve(factors, joints, &weights, None)?.theta;
+        weights = weights_of(factors, &residual_std(factors, joints, &theta));
+    }
+    Ok(weights)
 }
 
 /// Fits all unknowns of the block factors with weights and prior given.
@@ -108,6 +124,35 @@ pub fn residual_of(factors: &BlockFactors, theta: &DVector<f64>) -> Result<Vec<f
     Ok(residual_std(factors, &joints(factors)?, theta))
 }
 
+/// The solution of weighted rows, what it leaves of each joint, and how sure it is.
+struct SolvedRows {
+    solution: WeightedSolution,
+    /// Standard deviation of each joint's residual [N or Nm].
+    residual: Vec<f64>,
+    covariances: FitCovariances,
+}
+
+impl SolvedRows {
+    fn new(
+        factors: &BlockFactors,
+        joints: &[DMatrix<f64>],
+        inputs: FitInputs,
+    ) -> Result<Self, FitError> {
+        let mut solution = solve(factors, joints, inputs.weights, inputs.prior)?;
+        let residual = residual_std(factors, joints, &solution.theta);
+        if let Some(slope) = inputs.slope {
+            let bread = inputs.weights.iter().zip(slope);
+            let bread: Vec<f64> = bread.map(|(w, s)| w * s.sqrt()).collect();
+            solution.inverse = solve(factors, joints, &bread, inputs.prior)?.inverse;
+        }
+        Ok(Self {
+            covariances: covariance(factors, joints, &solution, inputs, &residual),
+            solution,
+            residual,
+        })
+    }
+}
+
 fn finish(
     factors: &BlockFactors,
     joints: &[DMatrix<f64>],
@@ -117,14 +162,11 @@ fn finish(
     let (n, u) = (columns.joints, columns.unknowns());
     let whole = stacked(factors, joints, &vec![1.0; n], None);
     let (condition, rank) = conditions(&whole.columns(0, u).into_owned())?;
-    let mut solution = solve(factors, joints, inputs.weights, inputs.prior)?;
-    let residual = residual_std(factors, joints, &solution.theta);
-    if let Some(slope) = inputs.slope {
-        let bread = inputs.weights.iter().zip(slope);
-        let bread: Vec<f64> = bread.map(|(w, s)| w * s.sqrt()).collect();
-        solution.inverse = solve(factors, joints, &bread, inputs.prior)?.inverse;
-    }
-    let covariances = covariance(factors, joints, &solution, inputs, &residual);
+    let SolvedRows {
+        solution,
+        residual,
+        covariances,
+    } = SolvedRows::new(factors, joints, inputs)?;
     let rows = factors.rows_per_joint();
     let error = |j: usize| {
         let moving = residual[j].powi(2) * factors.moving[j].count as f64;

@@ -332,13 +332,13 @@ impl<'a> LsqRows<'a> {
             return Ok(sums.map(|sums| sums.in_one_block()));
         }
         let folded = accumulate_weighted(robot, columns, weigher, &settings, &mut read);
-        let (sums, summary) = folded.map_err(|e| open.ended(e))?;
+        let (mut sums, summary) = folded.map_err(|e| open.ended(e))?;
         if self.logs[log].seen.is_none() {
             self.logs[log].seen = Some(SeenLog {
                 provenance: open.provenance()?,
                 notes: open.notes_with(&summary),
                 // what cannot be fitted is reported by the fit itself
-                jumps: jumps(&sums).unwrap_or_default(),
+                jumps: jumps(&mut sums).unwrap_or_default(),
                 summary,
             });
         }
