@@ -21,7 +21,6 @@ use super::position_filter::HIGHEST_SHARE;
 use super::settings::{FilterDesign, FilterSettings};
 use super::stretch::Stretch;
 use super::{MotionError, rest};
-use crate::math::kept::{KeptRows, KeptWork};
 use crate::math::zero_phase::run_each;
 use crate::robot::friction::{DoubleTanh, sign};
 
@@ -260,15 +259,8 @@ impl<'a> JointsAbreast<'a> {
         fill: impl Fn(usize, &mut [f64]),
     ) -> Result<Vec<f64>, MotionError> {
         let samples = self.q.len() / self.laws.len() - 2 * self.edge;
-        let rows = KeptRows {
-            samples,
-            channels,
-            first: design.trim,
-            kept: design.rows(samples),
-        };
         let mut fill = |k: usize, row: &mut [f64]| fill(k + self.edge, row);
-        let rows = design.kept.run(rows, &mut KeptWork::default(), &mut fill);
-        Ok(rows?)
+        design.run_rows([samples, channels], &mut fill)
     }
 
     /// Whether each joint moves in each row, row by row.

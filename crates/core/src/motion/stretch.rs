@@ -198,24 +198,34 @@ impl FilterDesign {
         Ok(self.parallel.run(channel, 1)?)
     }
 
+    /// The same of so many samples and channels row by row; `fill` writes the channels of a sample, in the order of time.
+    ///
+    /// # Errors
+    /// [`MotionError`] where there are too few samples for the filter.
+    pub fn run_rows(
+        &self,
+        [samples, channels]: [usize; 2],
+        fill: &mut dyn FnMut(usize, &mut [f64]),
+    ) -> Result<Vec<f64>, MotionError> {
+        let rows = KeptRows {
+            samples,
+            channels,
+            first: self.trim,
+            kept: self.rows(samples),
+        };
+        Ok(self.kept.run(rows, &mut KeptWork::default(), fill)?)
+    }
+
     /// Filters channels of a stretch and keeps every `decimation`-th sample.
     ///
     /// # Errors
     /// [`MotionError`] where the stretch is too short for the filter.
     pub fn run(&self, channels: &[&[f64]]) -> Result<Vec<Vec<f64>>, MotionError> {
         let samples = channels.first().map_or(0, |c| c.len());
-        let rows = self.rows(samples);
         let mut out = Vec::with_capacity(channels.len());
-        let mut work = KeptWork::default();
         // few are read side by side
         for group in channels.chunks(8) {
-            let of = KeptRows {
-                samples,
-                channels: group.len(),
-                first: self.trim,
-                kept: rows,
-            };
-            let filtered = self.kept.run(of, &mut work, &mut |k, row| {
+            let filtered = self.run_rows([samples, group.len()], &mut |k, row| {
                 row.iter_mut()
                     .zip(group)
                     .for_each(|(x, channel)| *x = channel[k]);

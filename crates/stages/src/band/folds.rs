@@ -247,28 +247,31 @@ fn add(
         })
         .collect();
     let mut regressor = vec![0.0; n * p];
-    let channels = joints
-        .iter()
-        .map(|of| vec![Vec::new(); of.places.len() + 2]);
-    let mut channels: Vec<Vec<Vec<f64>>> = channels.collect();
-    let width = channels.iter().map(Vec::len).sum::<usize>().max(1);
+    // of each joint its columns, its residual, and whether it moves
+    let mut first = vec![0];
+    first.extend(joints.iter().scan(0, |end, of| {
+        *end += of.places.len() + 2;
+        Some(*end)
+    }));
+    let width = first[n];
     let [usual, fewest] = PIECE;
-    let together = (PIECE_NUMBERS / width).clamp(fewest, usual);
+    let together = (PIECE_NUMBERS / width.max(1)).clamp(fewest, usual);
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     for from in (0..stretch.len()).step_by(together) {
         let piece = from..(from + together).min(stretch.len());
-        if filter.rows(piece.len()) < 2 {
+        let count = filter.rows(piece.len());
+        if count < 2 {
             continue;
         }
-        channels.iter_mut().flatten().for_each(Vec::clear);
-        for k in piece.clone() {
+        let mut fill = |k: usize, row: &mut [f64]| {
+            let k = piece.start + k;
             stretch.at(k, &mut q, &mut v, &mut a);
             model.model.robot.regressor(&q, &v, &a, &mut regressor);
-            for (j, (of, channels)) in joints.iter().zip(&mut channels).enumerate() {
+            for (j, of) in joints.iter().enumerate() {
                 let mut entries = [0.0; 5];
                 model.model.friction[j].gradient(v[j], &mut entries);
-                let row = &regressor[j * p..(j + 1) * p];
-                let theta = of.theta.iter().map(|i| row[*i]);
+                let y = &regressor[j * p..(j + 1) * p];
+                let theta = of.theta.iter().map(|i| y[*i]);
                 let friction = entries[..of.friction].iter().copied();
                 let offset = of.offset.then_some(1.0);
                 let added = of.added.iter().map(|column| column[k]);
@@ -280,16 +283,16 @@ fn add(
                     false => 1.0,
                 };
                 let all = all.map(|x| weight * x).chain([moving]);
-                let pairs = channels.iter_mut().zip(all);
-                pairs.for_each(|(channel, x)| channel.push(x));
+                let own = &mut row[first[j]..first[j + 1]];
+                own.iter_mut().zip(all).for_each(|(to, x)| *to = x);
             }
-        }
-        for (j, (of, channels)) in joints.iter().zip(&channels).enumerate() {
+        };
+        let rows = filter.run_rows([piece.len(), width], &mut fill)?;
+        for (j, of) in joints.iter().enumerate() {
             let u = of.places.len();
-            let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
-            let rows = filter.run(&channels)?;
-            let moves = |i: &usize| !rest::rests(rows[u + 1][*i]);
-            let moving: Vec<usize> = (0..filter.rows(piece.len())).filter(moves).collect();
+            let row = |i: usize| &rows[i * width + first[j]..i * width + first[j + 1]];
+            let moves = |i: &usize| !rest::rests(row(*i)[u + 1]);
+            let moving: Vec<usize> = (0..count).filter(moves).collect();
             let fold = |i: usize| {
                 let t = stretch.t[piece.start + filter.sample_of(i)];
                 folds.of_time(stretch.log, t)
@@ -299,9 +302,7 @@ fn add(
                 data.clear();
                 data.resize(part.len() * stride(u + 1), 0.0);
                 for (to, i) in data.chunks_exact_mut(stride(u + 1)).zip(part) {
-                    to.iter_mut()
-                        .zip(&rows[..=u])
-                        .for_each(|(to, row)| *to = row[*i]);
+                    to[..=u].copy_from_slice(&row(*i)[..=u]);
                 }
                 sums[fold(part[0])][j].add(&of.places, &data);
             }
