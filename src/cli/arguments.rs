@@ -177,8 +177,8 @@ mod tests {
         assert!(log_file("a.mcap").is_ok() && log_file("a.csv.zst").is_ok());
         let error = log_file("a.txt").unwrap_err();
         assert!(error.starts_with("must end in .csv or .mcap"), "{error}");
-        let picture = ends_in(["svg", "png"]);
-        assert!(picture("csv").is_err() && picture("a.pdf").is_err());
-        assert!(picture("a.svg").is_ok() && picture("a.PNG").is_ok());
+        let arm = ends_in(["urdf", "xml"]);
+        assert!(arm("urdf").is_err() && arm("a.pdf").is_err());
+        assert!(arm("a.urdf").is_ok() && arm("a.XML").is_ok());
     }
 }

@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(value_name = "LOG")]
     pub logs: Vec<LogSpec>,
     /// Draw the friction curves over each other; may be given more than once
-    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
+    #[arg(long, value_name = "FILE.svg", value_parser = arguments::ends_in(["svg"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
@@ -86,7 +86,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     for path in &args.plot {
         let figure = stages::compare::figure(&of, replayed.as_ref());
-        context.write_picture(path, &figure.svg())?;
+        context.write_text(path, &figure.svg())?;
     }
     Ok(Outcome::new(report.text_for(context.screen), document))
 }

@@ -1,7 +1,6 @@
 //! What every command is given beside its own arguments: where messages go, whether the user has
 //! asked to stop, and the progress bar.
 
-use cft_ident_core::explain::Explain;
 use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -16,7 +15,7 @@ use indicatif::{
 use super::error::{CliError, indented, to_stderr};
 use super::{outputs, typed};
 use cft_ident_logs::output::FileBatch;
-use cft_ident_report::report::{ReportDetail, TerminalScreen, figure};
+use cft_ident_report::report::{ReportDetail, TerminalScreen};
 use cft_ident_stages::identify::{self, Control};
 
 #[derive(Debug)]
@@ -142,19 +141,6 @@ impl Context {
 
     pub(super) fn page(&self) -> Option<PathBuf> {
         self.said().page.clone()
-    }
-
-    /// Writes a figure, as SVG or as PNG by the path's ending.
-    pub(super) fn write_picture(&self, path: &Path, svg: &str) -> Result<(), CliError> {
-        let png = path
-            .extension()
-            .is_some_and(|end| end.eq_ignore_ascii_case("png"));
-        if !png {
-            return self.write_text(path, svg);
-        }
-        let picture =
-            figure::png(svg).map_err(|e| CliError::output(e.explanation().of(path.display())))?;
-        Ok(self.files.write(path, &picture)?)
     }
 
     /// A warning about what was given, for the document and for standard error; once, however often it is found.

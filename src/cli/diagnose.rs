@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
     /// Draw the residual before and after; may be given more than once
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg", value_parser = arguments::ends_in(["svg"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
@@ -166,7 +166,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if !args.plot.is_empty() {
             let picture = residual::figure(&machine, &replayed.residual).svg();
             for path in &args.plot {
-                context.write_picture(path, &picture)?;
+                context.write_text(path, &picture)?;
             }
         }
         if let Some(path) = &args.report {

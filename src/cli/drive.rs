@@ -51,7 +51,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
     pub report: Option<PathBuf>,
     /// Figure of the positions of the first held-out log, or of the first
-    #[arg(long, value_name = "FILE.svg", value_parser = arguments::ends_in(["svg", "png"]))]
+    #[arg(long, value_name = "FILE.svg", value_parser = arguments::ends_in(["svg"]))]
     pub plot: Option<PathBuf>,
     /// Proportional gain of the controller [N m/rad, or counts of the firmware]
     #[arg(long, value_name = "X", value_parser = arguments::positive)]
@@ -240,7 +240,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut report = words::drive(&drives, &name);
     super::written(&mut report, &args.output);
     if let (Some(path), Some(first)) = (&args.plot, courses.first()) {
-        context.write_picture(path, &words::picture(&drives.drive.joints, first))?;
+        context.write_text(path, &words::picture(&drives.drive.joints, first))?;
         super::written(&mut report, path);
     }
     if let Some(path) = &args.report {

@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
     /// Draw the friction curves; may be given more than once
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg", value_parser = arguments::ends_in(["svg"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
@@ -89,7 +89,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check()?;
     for path in &args.plot {
         let figure = stages::friction::figure(machine, &found);
-        context.write_picture(path, &figure.svg())?;
+        context.write_text(path, &figure.svg())?;
     }
     checked.finish(report, document, (&args.output, &model), context)
 }

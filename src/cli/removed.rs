@@ -1,8 +1,9 @@
 //! Commands and options that an older version had, and what stands for each.
 
 use std::ffi::OsString;
+use std::path::Path;
 
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use super::CliError;
 
@@ -75,6 +76,19 @@ pub(super) fn named(answer: &clap::Error, arguments: &[OsString]) -> Option<CliE
         return Some(error.hint(*now));
     }
     let option = text(ContextKind::InvalidArg)?;
+    if answer.kind() == ErrorKind::ValueValidation && option.starts_with("--plot") {
+        let file = text(ContextKind::InvalidValue)?;
+        let picture = Path::new(file);
+        let png = picture.extension()?.eq_ignore_ascii_case("png");
+        let error = || CliError::usage(format!("{file}: figures are not written as PNG any more"));
+        let svg = picture.with_extension("svg");
+        return png.then(|| {
+            error().hint(format!(
+                "--plot {}; a browser opens it, and Inkscape makes a PNG of it",
+                svg.display()
+            ))
+        });
+    }
     let typed = |command: &&str| arguments.iter().any(|word| word == *command);
     let of =
         |(commands, old, _): &&(&[&str], &str, &str)| *old == option && commands.iter().any(typed);

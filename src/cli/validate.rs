@@ -48,7 +48,7 @@ pub struct Args {
     #[arg(short, long, value_name = "RESIDUAL.csv|.mcap", value_parser = arguments::log_file)]
     pub output: Option<PathBuf>,
     /// Draw measured and reconstructed torque; may be given more than once
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg", value_parser = arguments::ends_in(["svg"]))]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
@@ -204,7 +204,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     for path in &args.plot {
         let figure = stages::validate::figure(&found.validation, &names.join(", "));
-        context.write_picture(path, &figure.svg())?;
+        context.write_text(path, &figure.svg())?;
     }
     if let Some(file) = residual {
         context.files.add_log(file)?;

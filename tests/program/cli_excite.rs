@@ -102,6 +102,8 @@ fn an_option_that_went_says_what_stands_for_it() {
         ("diagnose a.csv -m m.toml --veto b.csv", "--holdout"),
         ("lsq a.csv -r r.toml -o m.toml --feasible", "always there"),
         ("fit a.csv -r r.toml -o m.toml --feasible", "always there"),
+        ("validate a.csv -m m.toml --plot v.png", "--plot v.svg"),
+        ("drive a.json -o d.toml --plot=v.PNG", "--plot v.svg"),
     ] {
         let mut command = Command::cargo_bin("cft-ident").unwrap();
         command.current_dir(folder.path()).args(line.split(' '));

@@ -215,7 +215,7 @@ fn other_laws_and_effects_stand_apart() {
 fn the_tables_fit_80_columns_and_the_pictures_are_written() {
     let folder = bench();
     let at = folder.path();
-    let line = "compare a.toml b.toml log.csv --plot c.svg --plot c.png --report c.html";
+    let line = "compare a.toml b.toml log.csv --plot c.svg --report c.html";
     let run = tool(at, line).assert().code(0);
     let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
     for line in text.lines() {
@@ -223,7 +223,6 @@ fn the_tables_fit_80_columns_and_the_pictures_are_written() {
     }
     let svg = fs::read_to_string(at.join("c.svg")).unwrap();
     assert!(svg.contains("a.toml") && svg.contains("b.toml"));
-    assert!(fs::read(at.join("c.png")).unwrap().starts_with(b"\x89PNG"));
     let page = fs::read_to_string(at.join("c.html")).unwrap();
     for part in [
         "Comparison of a.toml and b.toml",

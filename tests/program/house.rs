@@ -136,7 +136,6 @@ const DOORS: &[(&str, &str)] = &[
     ("lz4", "log/content.rs"),
     ("lzma_rs", "log/content.rs"),
     ("bzip2", "log/content.rs"),
-    ("resvg", "report/figure/png.rs"),
     ("sha2", "log/source.rs"),
     ("roxmltree", "config/urdf/xml.rs"),
 ];

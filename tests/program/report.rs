@@ -167,27 +167,6 @@ fn a_fit_tells_what_it_leaves_open_and_a_log_used_twice_is_no_test() {
 }
 
 #[test]
-fn a_figure_is_written_as_png_by_its_ending() {
-    let folder = tempfile::tempdir().unwrap();
-    let [a, b] = ["a.png", "b.png"].map(|name| folder.path().join(name));
-    for path in [&a, &b] {
-        let path = path.to_string_lossy();
-        run(
-            campaign(),
-            &["validate", "id.csv", "-m", "model.toml", "--plot", &path],
-        );
-    }
-    let picture = std::fs::read(&a).unwrap();
-    assert!(picture.starts_with(b"\x89PNG\r\n"));
-    assert!(
-        (20_000..2_000_000).contains(&picture.len()),
-        "{}",
-        picture.len()
-    );
-    assert!(picture == std::fs::read(&b).unwrap());
-}
-
-#[test]
 fn a_motion_is_reported_before_the_robot_moves() {
     let at = campaign();
     run(

@@ -133,7 +133,7 @@ pub struct Args {
     #[arg(hide_short_help = true, long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
     /// Draw positions, speeds and volts with their limits
-    #[arg(hide_short_help = true, long, value_name = "FILE.svg|.png", value_parser = arguments::ends_in(["svg", "png"]))]
+    #[arg(hide_short_help = true, long, value_name = "FILE.svg", value_parser = arguments::ends_in(["svg"]))]
     pub plot: Option<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::ends_in(["html"]))]
@@ -399,7 +399,7 @@ fn written(
         cli::written(&mut report, path);
     }
     if let Some(path) = &names.plot {
-        bench.context.write_picture(path, &figure(&title).svg())?;
+        bench.context.write_text(path, &figure(&title).svg())?;
         cli::written(&mut report, path);
     }
     if let Some(path) = &names.samples {

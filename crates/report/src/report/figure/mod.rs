@@ -1,4 +1,4 @@
-//! Static figures as SVG, and as PNG made from it: measured and reconstructed torque, friction curves, and designed motions.
+//! Static figures as SVG: measured and reconstructed torque, friction curves, and designed motions.
 //!
 //! A small writer of our own instead of a plot library: panels of unequal height, dashes, bands and
 //! a legend outside the data are what these figures consist of, and the same data must give the same
@@ -19,7 +19,6 @@ mod map;
 mod motion;
 mod overlay;
 mod panel;
-mod png;
 mod position;
 mod rate;
 mod residual;
@@ -37,7 +36,6 @@ pub use interval::{IntervalFigure, IntervalRow};
 pub use map::MapFigure;
 pub use motion::{MotionFigure, MotionPanel};
 pub use overlay::{OverlayFigure, OverlayPanel};
-pub use png::{PngError, png};
 pub use position::{PositionFigure, PositionPanel};
 pub use rate::{RateFigure, RatePanel};
 pub use residual::{ResidualFigure, ResidualLine, ResidualPanel};
