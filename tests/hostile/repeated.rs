@@ -24,7 +24,9 @@ fn a_log_that_is_given_twice_is_refused_by_everything_that_fits() {
     }
     let parts = "lsq good.csv@0..50% copy.csv@50..100% -r slide.toml -o parts.toml";
     assert_eq!(bench.run(parts).status, Some(0));
-    let parts = "diagnose good.csv@0..60% -m model.toml --holdout good.csv@60..80% --holdout good.csv@80..100%";
+    let part = "lsq good.csv@0..60% -r slide.toml -o part.toml";
+    assert_eq!(bench.run(part).status, Some(0));
+    let parts = "diagnose good.csv@0..60% -m part.toml --holdout good.csv@60..80% --holdout good.csv@80..100%";
     assert_eq!(bench.run(parts).status, Some(0));
 }
 
