@@ -22,12 +22,14 @@ fn a_log_that_is_given_twice_is_refused_by_everything_that_fits() {
     ] {
         bench.refuses(line, 3, &["holds rows that", "give each row once"]);
     }
-    let parts = "lsq good.csv@0..50% copy.csv@50..100% -r slide.toml -o parts.toml";
-    assert_eq!(bench.run(parts).status, Some(0));
-    let part = "lsq good.csv@0..60% -r slide.toml -o part.toml";
-    assert_eq!(bench.run(part).status, Some(0));
-    let parts = "diagnose good.csv@0..60% -m part.toml --holdout good.csv@60..80% --holdout good.csv@80..100%";
-    assert_eq!(bench.run(parts).status, Some(0));
+    for line in [
+        "lsq good.csv@0..50% copy.csv@50..100% -r slide.toml -o parts.toml",
+        "lsq good.csv@0..60% -r slide.toml -o part.toml",
+        "diagnose good.csv@0..60% -m part.toml --holdout good.csv@60..80% --holdout good.csv@80..100%",
+    ] {
+        let ended = bench.run(line);
+        assert_eq!(ended.status, Some(0), "{line}: {}", ended.stderr);
+    }
 }
 
 #[test]
