@@ -53,7 +53,7 @@ impl LaneWork for CholeskySolve<'_> {
 /// Solves L L' X = B; of the factor the lower half is read, and X takes the place of B.
 pub(crate) fn substitute(factor: &DMatrix<f64>, columns: &mut DMatrix<f64>) {
     debug_assert!(factor.is_square() && factor.nrows() == columns.nrows());
-    widest(Substitution {
+    widest(ColumnSubstitution {
         n: factor.nrows(),
         factor: factor.as_slice(),
         columns: columns.as_mut_slice(),
@@ -61,13 +61,13 @@ pub(crate) fn substitute(factor: &DMatrix<f64>, columns: &mut DMatrix<f64>) {
 }
 
 /// Systems of `n` unknowns with the same factor, their right sides one behind the other.
-struct Substitution<'a> {
+struct ColumnSubstitution<'a> {
     n: usize,
     factor: &'a [f64],
     columns: &'a mut [f64],
 }
 
-impl LaneWork for Substitution<'_> {
+impl LaneWork for ColumnSubstitution<'_> {
     type Output = ();
 
     #[inline(always)]

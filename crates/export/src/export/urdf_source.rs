@@ -12,7 +12,7 @@ use super::source_text::{SourceText, WrittenSource};
 use super::text_edits::TextEdits;
 use cft_ident_core::robot::standard::Body;
 use cft_ident_core::robot::tree::{Coordinate, Link};
-use cft_ident_files::config::xml::{Tree, without_comments};
+use cft_ident_files::config::xml::{XmlTree, without_comments};
 use cft_ident_files::config::{RobotFile, UrdfReplacement, replaced_in_urdf};
 
 /// The writing of one model into one source.
@@ -265,7 +265,7 @@ pub(super) fn hung_in_words(on: &str, names: &str, keeps: bool) -> String {
 /// The text of a URDF whose relative files are those of another folder.
 fn with_meshes_of(text: &str, folder: &str) -> String {
     let plain = without_comments(text);
-    let Ok(tree) = Tree::parse(&plain) else {
+    let Ok(tree) = XmlTree::parse(&plain) else {
         return text.to_owned();
     };
     let mut edits = TextEdits::of(&plain);

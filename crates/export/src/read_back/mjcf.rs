@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, V
 use super::classes::{ACTUATORS, ClassTable};
 use super::mechanism::{ReadBody, ReadJoint, ReadMechanism, ReadTendon};
 use super::{ReadError, filled, named, numbers, tensor, unit};
-use cft_ident_files::config::xml::{Element, Tree, without_comments};
+use cft_ident_files::config::xml::{Element, XmlTree, without_comments};
 
 /// What holds of a whole file.
 struct FileReading<'a> {
@@ -34,7 +34,7 @@ struct ElementPlace<'a> {
 /// What is not understood, and what changes bodies while MuJoCo compiles them.
 pub fn read(text: &str) -> Result<ReadMechanism, ReadError> {
     let plain = without_comments(text);
-    let tree = Tree::parse(&plain).map_err(|wrong| ReadError::new(wrong.problem.to_string()))?;
+    let tree = XmlTree::parse(&plain).map_err(|wrong| ReadError::new(wrong.problem.to_string()))?;
     let root = tree.root();
     let all = |name: &'static str| root.children().filter(move |e| e.name() == name);
     let mut reading = FileReading {

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 use super::mechanism::{ReadBody, ReadJoint, ReadMechanism};
 use super::{ReadError, filled, named, tensor, unit};
-use cft_ident_files::config::xml::{Element, Tree, without_comments};
+use cft_ident_files::config::xml::{Element, XmlTree, without_comments};
 
 /// Reads the text of a URDF; no URDF says gravity.
 ///
@@ -12,7 +12,7 @@ use cft_ident_files::config::xml::{Element, Tree, without_comments};
 /// What is not understood.
 pub fn read(text: &str, gravity: [f64; 3]) -> Result<ReadMechanism, ReadError> {
     let plain = without_comments(text);
-    let tree = Tree::parse(&plain).map_err(|wrong| ReadError::new(wrong.problem.to_string()))?;
+    let tree = XmlTree::parse(&plain).map_err(|wrong| ReadError::new(wrong.problem.to_string()))?;
     let children: Vec<Element> = tree.root().children().collect();
     let all = |kind: &'static str| children.iter().filter(move |e| e.name() == kind);
     let mut out = ReadMechanism {

@@ -14,8 +14,8 @@ use super::detectors::spike::SpikeDetector;
 use super::detectors::step::{FreshRows, LeapDetector, RowFreshness};
 use super::detectors::turn::TurnDetector;
 use super::detectors::windows::WindowSampler;
+use super::detectors::word_leaps::WordLeaps;
 use super::fault::{FaultEpisodes, FaultKind};
-use super::unsigned::WordLeaps;
 use super::words::ChannelRole;
 use crate::log::RowFault;
 

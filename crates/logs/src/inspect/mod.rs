@@ -11,7 +11,7 @@
 //! measure. Nothing is assumed about rate, units or noise.
 
 mod channel;
-mod detectors;
+pub(crate) mod detectors;
 mod draft;
 mod fault;
 mod findings;
@@ -24,7 +24,7 @@ mod position;
 mod shape;
 pub(crate) mod speeds;
 mod together;
-pub(crate) mod unsigned;
+mod unsigned;
 mod verdicts;
 pub(crate) mod words;
 

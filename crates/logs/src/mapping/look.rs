@@ -7,7 +7,7 @@ use super::column::LogColumn;
 use super::content;
 use super::error::MappingError;
 use super::units::wrap_of;
-use crate::inspect::unsigned::WordLeaps;
+use crate::inspect::detectors::word_leaps::WordLeaps;
 use crate::inspect::words::{is_command, words};
 use crate::inspect::{self, ChannelColumn, ChannelRole, ColumnPlan, InspectedChannel};
 use crate::log::{

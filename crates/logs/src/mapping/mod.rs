@@ -26,10 +26,11 @@ mod look;
 mod recorder;
 mod shown;
 mod units;
+mod urdf_joint;
 
 pub use choose::{JointColumns, Mapping};
 pub use clock::ClockColumn;
 pub use column::LogColumn;
 pub use error::MappingError;
 pub use look::{ClockSource, LogHints, SeenColumns, look};
-pub use shown::UrdfJoint;
+pub use urdf_joint::UrdfJoint;

@@ -1,8 +1,8 @@
 //! What recorders are known to write, where the sizes of numbers would say something else.
 
 use super::column::LogColumn;
-use super::shown::UrdfJoint;
 use super::units::Unit;
+use super::urdf_joint::UrdfJoint;
 use crate::inspect::words::{has, words};
 use crate::log::escape;
 

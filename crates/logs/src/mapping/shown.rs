@@ -3,21 +3,11 @@
 use super::column::LogColumn;
 use super::family::{Family, Key, families};
 use super::units::{stated_position, stated_torque};
+use super::urdf_joint::UrdfJoint;
 use crate::inspect::ChannelRole;
 use crate::inspect::words::{joint, slides, words};
 use crate::log::{POSITIONS, TORQUES, UnitKind, stated_unit};
 use cft_ident_core::robot::JointKind;
-
-/// A joint of the robot, where a URDF names it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct UrdfJoint {
-    pub name: String,
-    pub kind: JointKind,
-    /// Its largest torque [N or Nm].
-    pub torque: Option<f64>,
-    /// Its least and its greatest position [m or rad].
-    pub position: Option<[f64; 2]>,
-}
 
 /// The joints of the family of positions that has torques beside it and is likeliest measured, else of the largest.
 pub(super) fn shown(columns: &[LogColumn]) -> Vec<UrdfJoint> {

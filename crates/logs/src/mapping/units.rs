@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::column::LogColumn;
-use super::shown::UrdfJoint;
+use super::urdf_joint::UrdfJoint;
 use crate::inspect::words::{NamedDrive, drive, lists, words};
 use crate::log::{POSITIONS, TORQUES, UnitKind, escape, is_label, spoken_unit, stated_unit};
 use cft_ident_core::robot::JointKind;

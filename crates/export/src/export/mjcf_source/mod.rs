@@ -18,7 +18,7 @@ use super::text_edits::TextEdits;
 use super::urdf_source::hung_in_words;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::standard::Body;
-use cft_ident_files::config::xml::{Element, Tree, without_comments};
+use cft_ident_files::config::xml::{Element, XmlTree, without_comments};
 use layout::{SourceJoint, SourceLayout};
 
 /// The writing of one model into one source.
@@ -50,7 +50,7 @@ pub fn written(
         problem,
         remedy: remedy.to_owned(),
     };
-    let tree = Tree::parse(&plain).map_err(|wrong| {
+    let tree = XmlTree::parse(&plain).map_err(|wrong| {
         let text = format!("line {}: {}", wrong.line, wrong.problem.what);
         refused(text, &wrong.problem.remedies.join("; "))
     })?;

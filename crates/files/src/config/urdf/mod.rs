@@ -10,7 +10,6 @@ pub mod capsules;
 mod held;
 mod link;
 pub mod mesh;
-pub(super) mod mjcf;
 mod parts;
 mod possible;
 mod seat;
@@ -115,7 +114,7 @@ fn turned(r: &Rotation, a: &Rotation) -> Rotation {
 }
 
 /// The error for a text that is no XML.
-fn no_xml(file: &str, wrong: xml::MalformedText) -> ConfigError {
+pub(super) fn no_xml(file: &str, wrong: xml::MalformedText) -> ConfigError {
     ConfigError::Syntax {
         file: file.to_owned(),
         line: wrong.line,
@@ -140,7 +139,7 @@ impl UrdfChain {
 
     fn parse_with(file: &str, text: &str, asked: &ChainRequest) -> Result<Self, ConfigError> {
         let text = xml::without_comments(text);
-        let tree = xml::Tree::parse(&text).map_err(|wrong| no_xml(file, wrong))?;
+        let tree = xml::XmlTree::parse(&text).map_err(|wrong| no_xml(file, wrong))?;
         let place = UrdfPlace {
             file,
             angles: asked.angles,

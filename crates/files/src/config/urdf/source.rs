@@ -32,7 +32,7 @@ pub struct UrdfEdits {
 pub fn replaced(file: &str, text: &str, with: &UrdfEdits) -> Result<String, ConfigError> {
     // comments become as many spaces, so that places are those of the text
     let plain = xml::without_comments(text);
-    let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
+    let tree = xml::XmlTree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
     let root = tree.root();
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
     let joints = root.children().filter(|e| e.name() == "joint");

@@ -51,7 +51,7 @@ pub struct MalformedText {
 }
 
 /// A text that was read.
-pub struct Tree<'t> {
+pub struct XmlTree<'t> {
     document: Document<'t>,
     /// Where the lines end.
     ends: Vec<usize>,
@@ -61,10 +61,10 @@ pub struct Tree<'t> {
 #[derive(Clone, Copy)]
 pub struct Element<'a, 't> {
     node: Node<'a, 't>,
-    tree: &'a Tree<'t>,
+    tree: &'a XmlTree<'t>,
 }
 
-impl<'t> Tree<'t> {
+impl<'t> XmlTree<'t> {
     /// Reads a text [`without_comments`].
     pub fn parse(text: &'t str) -> Result<Self, MalformedText> {
         let last = 1 + text.matches('\n').count();

@@ -17,3 +17,4 @@ pub(super) mod step;
 pub(super) mod turn;
 pub(super) mod velocity;
 pub(super) mod windows;
+pub(crate) mod word_leaps;

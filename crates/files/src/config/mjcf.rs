@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{no_xml, xml};
+use super::urdf::{no_xml, xml};
 use crate::config::{ConfigError, text};
 use cft_ident_logs::log::{escape, shown};
 
@@ -38,7 +38,7 @@ fn flat(
     let file = shown(path);
     let whole = text(path)?;
     let plain = xml::without_comments(&whole);
-    let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(&file, wrong))?;
+    let tree = xml::XmlTree::parse(&plain).map_err(|wrong| no_xml(&file, wrong))?;
     let includes = tree.root().descendants().filter(|e| e.name() == "include");
     let mut pieces = Vec::new();
     for include in includes {
@@ -73,7 +73,7 @@ fn flat(
 /// What stands in the root of a text.
 fn inside(text: &str, file: &str) -> Result<String, ConfigError> {
     let plain = xml::without_comments(text);
-    let tree = xml::Tree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
+    let tree = xml::XmlTree::parse(&plain).map_err(|wrong| no_xml(file, wrong))?;
     let whole = tree.root().range();
     let begin = xml::tag_end(&plain, whole.start);
     let end = plain[whole.clone()]
