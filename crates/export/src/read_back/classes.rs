@@ -51,7 +51,7 @@ pub(super) const ACTUATORS: [&str; 11] = [
     "dcmotor",
 ];
 
-fn kind<'a>(name: &'a str) -> &'a str {
+fn kind(name: &str) -> &str {
     match name {
         name if ACTUATORS.contains(&name) => "actuator",
         "fixed" | "spatial" => "tendon",
