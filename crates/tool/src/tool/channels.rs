@@ -159,8 +159,8 @@ const MOST_M: f64 = 20.0;
 fn three_named(table: &WrenchTable) -> Option<[usize; 3]> {
     let last = |name: &String| {
         let plain = name.split(['[', '(']).next().unwrap_or(name).to_lowercase();
-        let tokens = plain.split(|c: char| !c.is_alphanumeric());
-        let last = tokens.filter(|token| !token.is_empty()).next_back();
+        let mut tokens = plain.split(|c: char| !c.is_alphanumeric());
+        let last = tokens.rfind(|token| !token.is_empty());
         last.unwrap_or_default().to_owned()
     };
     let ends: Vec<String> = table.names.iter().map(last).collect();
