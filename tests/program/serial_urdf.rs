@@ -252,9 +252,21 @@ fn a_tip_chooses_one_branch() {
     let file = file_of(&fixture("urdf/gantry.urdf"), "tip = \"weight\"\n");
     assert_eq!(file.joint_names(), ["rail", "shoulder", "elbow"]);
     assert_eq!(file.robot.link.len(), 4);
-    // the hand is not on the way, and so not lumped
+    // the hand is fixed to the forearm, and its fingers hang on it: the forearm carries their masses
     let fore = file.robot.link[2].inertial.as_ref().unwrap();
-    assert_eq!((fore.mass, fore.centre), (1.4, [0.01, -0.14, 0.02]));
+    let (sin, cos) = f64::sin_cos(0.3);
+    let (hand, fingers) = (0.5, 2.0 * 0.08);
+    let mass = 1.4 + hand + fingers;
+    let along_hand = hand * 0.02 + fingers * 0.08;
+    let moments = [
+        1.4 * 0.01 + sin * along_hand,
+        1.4 * -0.14 + (hand + fingers) * -0.3,
+        1.4 * 0.02 + (hand + fingers) * 0.01 + cos * along_hand,
+    ];
+    assert!((fore.mass - mass).abs() < 1e-12, "{}", fore.mass);
+    for (centre, moment) in fore.centre.iter().zip(moments) {
+        assert!((centre - moment / mass).abs() < 1e-12, "{:?}", fore.centre);
+    }
 }
 
 #[test]
