@@ -85,12 +85,13 @@ pub(super) fn write_model(
     let text = model.to_toml()?;
     let name = escape(&path.to_string_lossy());
     let again = ModelFile::parse_in(&name, &text, path.parent());
-    let read = again
-        .map_err(IdentifyError::from)
-        .and_then(|file| refined_or_friction(&file, &name));
-    match read {
-        Ok(_) => context.write_text(path, &text),
-        Err(error) => {
+    let wrong: Option<IdentifyError> = match again {
+        Ok(file) => refined_or_friction(&file, &name).err(),
+        Err(error) => Some(error.into()),
+    };
+    match wrong {
+        None => context.write_text(path, &text),
+        Some(error) => {
             let what =
                 format!("the model that came out cannot be used, and is not written: {error}");
             Err(CliError::new(Exit::Undetermined, what)

@@ -297,7 +297,10 @@ fn execute(
     }
     let known = checked.setup.data;
     let setup = known.setup.clone();
-    let read = |logs: &[Log]| LogData::read_all(&setup, logs, &[&known.logs], &context.control);
+    let read = |logs: &[Log]| -> Result<Vec<LogData>, CliError> {
+        let beside: &[&[LogData]] = &[&known.logs];
+        Ok(LogData::read_all(&setup, logs, beside, &context.control)?)
+    };
     let data = Dataset {
         one_joint: read(&of_friction)?,
         held_out: read(&logs_of(&unseen))?,
