@@ -14,6 +14,9 @@ use crate::errors::{UsageError, of_input, of_stage};
 use crate::numbers::ModelNumbers;
 
 /// A robot file.
+/// Name, joint, value, standard deviation, value in use and unit of a parameter.
+type ParameterRow = (String, Option<String>, f64, Option<f64>, f64, String);
+
 #[pyclass(frozen, module = "cft_ident._native")]
 pub struct Robot {
     pub machine: RobotSetup,
@@ -207,7 +210,7 @@ impl Model {
 
     /// Name, joint, value, standard deviation, value in use and unit of every parameter.
     #[getter]
-    fn parameters(&self) -> Vec<(String, Option<String>, f64, Option<f64>, f64, String)> {
+    fn parameters(&self) -> Vec<ParameterRow> {
         let shown = self.given.file.parameters.iter();
         shown
             .map(|p| {

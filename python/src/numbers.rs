@@ -15,6 +15,8 @@ use crate::data::Model;
 use crate::errors::{UsageError, of_input, of_stage};
 
 type Rows<'py> = PyReadonlyArrayDyn<'py, f64>;
+/// Names of parameters and their covariance, square.
+type NamedCovariance<'py> = (Vec<String>, Bound<'py, PyArray2<f64>>);
 
 /// What a model computes with, made once.
 pub struct ModelNumbers {
@@ -361,7 +363,7 @@ impl State {
 pub fn covariance<'py>(
     py: Python<'py>,
     model: PyRef<'py, Model>,
-) -> PyResult<Option<(Vec<String>, Bound<'py, PyArray2<f64>>)>> {
+) -> PyResult<Option<NamedCovariance<'py>>> {
     let file = &model.given.file;
     // a model that predicts with other numbers than were estimated holds the covariance of the estimates
     let Some(found) = file

@@ -24,6 +24,8 @@ use crate::work;
 
 /// Document as JSON, page as HTML, text for a terminal.
 type Shown = (String, String, String);
+/// Name of a robot of a fleet, its parts and its models.
+type FleetRobot<'py> = (String, Vec<PyRef<'py, Part>>, Vec<PyRef<'py, Model>>);
 
 fn shown(document: &JsonDocument, report: &Report) -> Shown {
     (document.text(), report.html(), report.text())
@@ -398,10 +400,7 @@ pub fn merge(parts: Vec<PyRef<'_, Part>>) -> PyResult<Part> {
 
 /// Parameters of robots over their logs: of each robot its name, and reduced logs or models in order of time.
 #[pyfunction]
-pub fn track(
-    py: Python<'_>,
-    robots: Vec<(String, Vec<PyRef<'_, Part>>, Vec<PyRef<'_, Model>>)>,
-) -> PyResult<Shown> {
+pub fn track(py: Python<'_>, robots: Vec<FleetRobot<'_>>) -> PyResult<Shown> {
     let mut all = Vec::new();
     for (name, parts, models) in robots {
         let mut sources = Vec::new();

@@ -126,9 +126,8 @@ fn linear(machine: &RobotSetup, logs: [&Log; 2], mass: f64, control: &Control) -
         rest_speed: Vec::new(),
     };
     let read = |log: &Log| -> BlockFactors {
-        let mut open = LogData::read(machine, log, control)
-            .and_then(|log| log.open(control))
-            .expect("a log");
+        let read = LogData::read(machine, log, control).expect("a log");
+        let mut open = read.open(control).expect("a log");
         accumulate(robot, &columns, &machine.settings(), &mut |b| open.read(b))
             .expect("rows")
             .0

@@ -161,8 +161,8 @@ fn a_payload_and_a_rotor_are_in_the_urdf_and_not_a_second_time_beside_it() {
     let model = file.model("model.toml").unwrap();
     // of two laws of that name the one of a serial robot: its shape is the centre of the body
     let law = |name: &str, shape: usize| {
-        let is = |law: &&&_| law.entry.name == name && law.shape.len() == shape;
-        *LAWS.iter().find(is).unwrap()
+        let mut named = LAWS.iter().filter(|law| law.entry.name == name);
+        *named.find(|law| law.shape.len() == shape).unwrap()
     };
     let payload = ModelEffect::new(
         law("payload", 3),
