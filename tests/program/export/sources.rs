@@ -75,7 +75,7 @@ impl Bench {
     }
 
     /// The MJCF with the model in it.
-    fn into_mjcf(&self, source: &str) -> String {
+    fn mjcf_from(&self, source: &str) -> String {
         self.write("source.xml", source);
         self.export("--mjcf out.xml --mjcf-source source.xml")
             .success();
@@ -144,11 +144,11 @@ fn what_changes_bodies_while_an_mjcf_is_compiled_is_taken_out_and_named() {
     ] {
         let source = MJCF.replacen(old, new, 1);
         assert_ne!(source, MJCF);
-        let text = bench.into_mjcf(&source);
+        let text = bench.mjcf_from(&source);
         let head = text.split("-->").next().unwrap();
         assert!(head.contains(gone), "{gone}: {head}");
     }
-    let kept = bench.into_mjcf(&MJCF.replace("<compiler ", "<compiler inertiafromgeom=\"false\" "));
+    let kept = bench.mjcf_from(&MJCF.replace("<compiler ", "<compiler inertiafromgeom=\"false\" "));
     assert!(kept.contains("inertiafromgeom=\"false\""));
     // what is no body of the robot stays as it was
     assert!(kept.contains("<geom type=\"capsule\" size=\"0.05\" fromto=\"0 0 0 0 0.2 0\"/>"));
@@ -159,7 +159,7 @@ fn what_is_welded_to_a_link_weighs_nothing() {
     let bench = Bench::arm();
     let tool = "<body name=\"tool\" pos=\"0.3 0 0\"><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>\
                 <geom size=\"0.1\"/><frame pos=\"0 0 1\"><geom size=\"0.2\" mass=\"3\"/></frame></body>\n        </body>";
-    let text = bench.into_mjcf(&MJCF.replacen("</body>", tool, 1));
+    let text = bench.mjcf_from(&MJCF.replacen("</body>", tool, 1));
     let tool = text.split("name=\"tool\"").nth(1).unwrap();
     let tool = tool.split("</body>").next().unwrap();
     assert!(!tool.contains("<inertial"), "{tool}");
@@ -191,7 +191,7 @@ fn torques_that_the_source_adds_stay_and_are_lines_of_the_table() {
             "the tendon belt",
         ),
     ] {
-        let text = bench.into_mjcf(&MJCF.replacen(old, new, 1));
+        let text = bench.mjcf_from(&MJCF.replacen(old, new, 1));
         assert!(text.contains(&format!("the source adds {what}")), "{what}");
         assert!(bench.text("out.xml.left-out.toml").contains(what), "{what}");
         assert!(
@@ -291,7 +291,7 @@ fn frames_static_bodies_includes_and_every_notation_of_an_orientation_are_read()
     ] {
         let source = MJCF.replacen(old, new, 1);
         assert_ne!(source, MJCF, "{old}");
-        bench.into_mjcf(&source);
+        bench.mjcf_from(&source);
     }
     // l3 in two frames and a body without a joint
     let framed = MJCF
@@ -300,7 +300,7 @@ fn frames_static_bodies_includes_and_every_notation_of_an_orientation_are_read()
                   <body name=\"l3\" pos=\"0.3 0 0\">", 1)
         .replacen(" class=\"wrist\"/>", "/>", 1)
         .replacen("</body>", "</body></body></frame></frame>", 1);
-    bench.into_mjcf(&framed);
+    bench.mjcf_from(&framed);
     // bodies in a file of their own, below
     let (before, rest) = MJCF.split_once("<worldbody>").unwrap();
     let (bodies, after) = rest.split_once("</worldbody>").unwrap();
@@ -309,7 +309,7 @@ fn frames_static_bodies_includes_and_every_notation_of_an_orientation_are_read()
         "parts/body.xml",
         &format!("<mujocoinclude><worldbody>{bodies}</worldbody></mujocoinclude>"),
     );
-    let text = bench.into_mjcf(&format!(
+    let text = bench.mjcf_from(&format!(
         "{before}<include file=\"parts/body.xml\"/>{after}"
     ));
     assert!(!text.contains("<include") && text.contains("fromto"));
@@ -397,7 +397,7 @@ fn branches_that_were_held_are_taken_off_the_link_that_carries_them_or_weigh_nex
             "<body name=\"camera\" pos=\"0 0.1 0.1\" euler=\"0 10 0\"><inertial pos=\"0 0.04 0.05\" mass=\"{mass}\" diaginertia=\"0.005 0.006 0.007\"/>\
                     <joint name=\"pan\" ref=\"20\"/><body name=\"lens\"><geom size=\"0.01\" mass=\"0\"/></body></body><body name=\"l2\""
         );
-        let text = bench.into_mjcf(&MJCF.replacen("<body name=\"l2\"", &hung, 1));
+        let text = bench.mjcf_from(&MJCF.replacen("<body name=\"l2\"", &hung, 1));
         assert_eq!(text.contains("mass=\"1e-9\""), !keeps, "{text}");
     }
 }
@@ -407,7 +407,7 @@ fn a_branch_whose_weight_only_its_geoms_say_weighs_next_to_nothing() {
     let bench = Bench::arm();
     let hung =
         "<body name=\"camera\"><joint name=\"pan\"/><geom size=\"0.05\"/></body><body name=\"l2\"";
-    let text = bench.into_mjcf(&MJCF.replacen("<body name=\"l2\"", hung, 1));
+    let text = bench.mjcf_from(&MJCF.replacen("<body name=\"l2\"", hung, 1));
     assert!(text.contains("mass=\"1e-9\""), "{text}");
 }
 
@@ -433,7 +433,7 @@ fn followers_get_their_inertials_and_no_friction_beside_that_of_the_joint_that_t
             + &finger(name, "right_joint", "-0.04", "0 0 -1");
         let source = MJCF.replacen("</body>", &format!("{both}</body>"), 1);
         let tie = "<equality><joint joint1=\"right_joint\" joint2=\"left_joint\" polycoef=\"0.1 -2 0 0 0\"/></equality></mujoco>";
-        let text = bench.into_mjcf(&source.replace("</mujoco>", tie));
+        let text = bench.mjcf_from(&source.replace("</mujoco>", tie));
         assert!(
             !text.contains("mass=\"9\"") && !text.contains("damping=\"7\""),
             "{text}"
@@ -443,7 +443,7 @@ fn followers_get_their_inertials_and_no_friction_beside_that_of_the_joint_that_t
     }
     // one that is not there is named, with what it carries
     let one = finger("left", "left_joint", "0.04", "0 0 1");
-    let text = bench.into_mjcf(&MJCF.replacen("</body>", &format!("{one}</body>"), 1));
+    let text = bench.mjcf_from(&MJCF.replacen("</body>", &format!("{one}</body>"), 1));
     assert!(
         text.contains("link right of the model is not in this file"),
         "{text}"

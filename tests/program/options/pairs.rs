@@ -25,7 +25,7 @@ fn choices(command: &str, given: &[&str]) -> Vec<(String, String)> {
         let contradicts = |given: &&str| others.iter().any(|a| a.get_long() == Some(given));
         if given
             .iter()
-            .any(|given| contradicts(&given) || *given == name)
+            .any(|given| contradicts(given) || *given == name)
         {
             continue;
         }
@@ -42,12 +42,12 @@ fn choices(command: &str, given: &[&str]) -> Vec<(String, String)> {
     out
 }
 
+/// The error of a fit by its options and the file that it writes, none where it is refused; or what is wrong with it.
+type ErrorOf<'a> = dyn Fn(&str, &str) -> Result<Option<f64>, String> + Sync + 'a;
+
 /// Runs a fit alone with each choice and with each pair of two options. `line` makes the command that writes a file;
 /// `error` its error, or what is wrong with it.
-fn check(
-    choices: &[(String, String)],
-    error: &(dyn Fn(&str, &str) -> Result<Option<f64>, String> + Sync),
-) {
+fn check(choices: &[(String, String)], error: &ErrorOf) {
     let single: Vec<(usize, &str)> = (choices.iter().enumerate())
         .map(|(i, (_, words))| (i, words.as_str()))
         .collect();
