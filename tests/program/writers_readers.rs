@@ -121,8 +121,11 @@ impl Machine {
                 Some(0) => {}
                 Some(3) => {
                     let reason = self.reason(line, model);
+                    // a fit with negative friction wants more torque at rest than its log ever had
+                    let at_rest = self.no_payload && line.starts_with("excite");
                     assert!(
-                        reason.is_some_and(|reason| said.contains(reason)),
+                        reason.is_some_and(|reason| said.contains(reason))
+                            || at_rest && said.contains("at rest already"),
                         "{line} of {model}: {said}"
                     );
                 }

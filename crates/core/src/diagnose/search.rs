@@ -110,12 +110,12 @@ impl<'a> Field<'a> {
         let part = watch.part("candidates", open.len());
         let whole = left_out.whole_fit();
         let gain_of_fit = |candidate: usize| {
+            part.step();
             let terms = self.terms_of(candidate);
             let gain = whole.as_ref().map(|w| left_out.gain_of_fit(terms, w));
             (gain.unwrap_or(f64::INFINITY), candidate)
         };
         let look = |&(_, candidate): &(f64, usize)| {
-            part.step();
             let gain = left_out.gain(self.terms_of(candidate));
             RejectedCandidate { candidate, gain }
         };

@@ -131,8 +131,7 @@ fn blocks_that_judge_alone_are_judged_by_the_fit_to_all_others() {
 }
 
 #[test]
-fn the_gain_of_a_fit_to_all_blocks_is_the_fall_of_their_squares_and_above_that_of_blocks_left_out()
-{
+fn the_gain_of_a_fit_to_all_blocks_is_the_fall_of_their_squares() {
     let (sums, terms) = (sums(), terms());
     let left_out = BlocksLeftOut::new(&sums, 0, &terms).expect("rows that determine all");
     let whole = left_out.whole_fit().expect("rows that determine all");
@@ -145,7 +144,6 @@ fn the_gain_of_a_fit_to_all_blocks_is_the_fall_of_their_squares_and_above_that_o
     for more in [more(), more()[..1].to_vec()] {
         let gain = left_out.gain_of_fit(&more, &whole);
         near(gain, squares(&terms) - squares(&terms.with(&more)), 1e-8);
-        assert!(left_out.gain(&more).value < gain);
     }
 }
 
