@@ -71,7 +71,7 @@ proposed() {
 mkdir "$work/bin" && ln -s "$tool" "$work/bin/cft-ident"
 (cd "$work" && for machine in ur10 tx40 bldc; do "$tool" example -q $machine > /dev/null; done)
 one ur10 "$work/ur10/ur10.toml" "$work/ur10/ur10.csv@0..70%" "$work/ur10/ur10.csv@70..100%" \
-  "cft-ident new arm --urdf $work/ur10/ur10.urdf --log $work/ur10/ur10.csv"
+  "cft-ident new arm --urdf $work/ur10/ur10.urdf --log $work/ur10/ur10.csv@0..70%"
 one tx40 "$work/tx40/tx40.toml" "$work/tx40/tx40.csv@0..70%" "$work/tx40/tx40.csv@70..100%"
 one bldc "$work/bldc/bldc.toml" "$work/bldc/bldc.csv@15.2..23s" "$work/bldc/bldc.csv@23..29.5s"
 if [ -n "$data" ]; then

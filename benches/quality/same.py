@@ -18,12 +18,12 @@ from tool import record
 LINES = (
     "inspect first.csv second.mcap -r arm.toml --json inspect.json",
     "lsq first.csv second.mcap -r arm.toml -o model.toml --json lsq.json --report lsq.html",
-    "validate second.mcap -m model.toml --json validate.json -o residual.csv --report validate.html",
+    "validate unseen.mcap -m model.toml --json validate.json -o residual.csv --report validate.html",
     "torque second.mcap -m model.toml -o torque.mcap --json torque.json",
     "friction first.csv -r arm.toml --joint elbow -o friction.toml --json friction.json",
     "reduce first.csv -r arm.toml -o first.cfi",
     "lsq first.cfi -r arm.toml -o reduced.toml --json reduced.json",
-    "diagnose first.csv -m model.toml --holdout second.mcap -o refined.toml --json diagnose.json --report diagnose.html",
+    "diagnose first.csv -m model.toml --holdout unseen.mcap -o refined.toml --json diagnose.json --report diagnose.html",
     "simulate -r arm.toml -m model.toml --seconds 4 --seed 5 -o simulated.csv --json simulate.json",
     "excite -r arm.toml -m model.toml --seconds 5 --seed 5 -o motion.toml --json excite.json",
     "identify arm.toml first.csv -o run --json identify.json",
@@ -38,6 +38,7 @@ def made(tool, lines, folder, threads):
                                      "torque = 60.0\n\n[limits.elbow]\nposition = [-2.0, 2.0]\nspeed = 4.0\ntorque = 20.0\n")  # fmt: skip
     arm_logs.write_csv(folder / "first.csv", arm_logs.drive(3))
     arm_logs.write_mcap_cdr(folder / "second.mcap", arm_logs.drive(4, 10.0))
+    arm_logs.write_mcap_cdr(folder / "unseen.mcap", arm_logs.drive(6, 10.0))
     given = set(folder.rglob("*"))
     for line in lines:
         ended = subprocess.run([tool, *line.split(), "-q", "--threads", str(threads)], cwd=folder, capture_output=True)

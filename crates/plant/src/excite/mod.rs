@@ -95,12 +95,16 @@ pub enum ExciteError {
     NothingExcited { unknowns: usize, starts: usize },
     #[explain(
         format!(
-            "rest at the ends needs blends longer than {seconds:.1} s: with those a limit is still used to {:.1} %",
+            "rest at the ends needs blends longer than {seconds:.1} s: with those the {what} is still {:.1} % of its limit",
             100.0 * share
         ),
-        "keep more in reserve (--margin)"
+        "widen that limit in the robot file (one that it does not state is what the model's logs reached), or keep more in reserve (--margin)"
     )]
-    NoBlend { seconds: f64, share: f64 },
+    NoBlend {
+        seconds: f64,
+        what: String,
+        share: f64,
+    },
     #[explain(
         "the pose of --from breaks a limit itself: the {what} is {value:.4}",
         "give the pose in which the robot stands"

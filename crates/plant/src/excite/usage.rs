@@ -168,8 +168,8 @@ impl TimeScaling {
         from: Option<&[f64]>,
     ) -> Result<Self, ExciteError> {
         let period = series.period();
-        // of the longest: the least that a blend uses, and the way that leads to it
-        let mut last = (f64::INFINITY, None);
+        // of the longest: the limit that the best blend breaks, and the one on the way to a blend that breaks none
+        let mut last = (None, None);
         for duration in DURATIONS {
             let tried = (0..STARTS).map(|k| {
                 let blend = Self {
@@ -177,13 +177,12 @@ impl TimeScaling {
                     seconds: duration * period,
                     periods: Some(periods),
                 };
-                let share = worst(&along_blend(machine, channels, series, &blend));
-                (share, blend)
+                (along_blend(machine, channels, series, &blend), blend)
             });
-            let mut tried: Vec<(f64, Self)> = tried.collect();
-            tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-            last = (tried[0].0, None);
-            for (_, blend) in tried.into_iter().filter(|(share, _)| *share <= 1.0) {
+            let mut tried: Vec<(Vec<ChannelUse>, Self)> = tried.collect();
+            tried.sort_by(|a, b| worst(&a.0).total_cmp(&worst(&b.0)));
+            last = (most_broken(tried[0].0.clone()), None);
+            for (_, blend) in tried.into_iter().filter(|(uses, _)| worst(uses) <= 1.0) {
                 let Some(from) = from else { return Ok(blend) };
                 let way = along_way(machine, channels, from, &blend.at(series, 0.0));
                 match most_broken(way) {
@@ -199,9 +198,10 @@ impl TimeScaling {
                 what: broken.what(),
                 percent: (100.0 * broken.t).round(),
             },
-            (share, None) => ExciteError::NoBlend {
+            (broken, None) => ExciteError::NoBlend {
                 seconds: DURATIONS[DURATIONS.len() - 1] * period,
-                share,
+                what: broken.as_ref().map_or_else(String::new, ChannelUse::what),
+                share: broken.map_or(f64::INFINITY, |broken| broken.share),
             },
         })
     }
@@ -210,7 +210,12 @@ impl TimeScaling {
 impl ChannelUse {
     /// What is bounded, and of what.
     fn what(&self) -> String {
-        format!("{} of {}", self.channel.quantity.name(), self.channel.name)
+        let ChannelUse { channel, .. } = self;
+        format!(
+            "{} of {}",
+            channel.quantity.called(&channel.unit),
+            channel.name
+        )
     }
 
     /// The same channel along two motions.
