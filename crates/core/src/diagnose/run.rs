@@ -13,7 +13,7 @@ use super::problem::constant_columns::ConstantColumns;
 use super::problem::data_split::{DataSplit, LogRole};
 use super::refit::ModelRefit;
 use super::searched::SearchedCase;
-use super::steps::judge;
+use super::steps::{AcceptedBy, judge};
 use super::unexplained::dependence::{ModelResiduals, dependences};
 use super::unexplained::noise_floor::floor;
 use super::unexplained::{part_unexplained, unexplained};
@@ -39,7 +39,7 @@ pub fn diagnose(
     watch.unless_stopped()?;
     let searched = prepared.search(watch)?;
     watch.unless_stopped()?;
-    let judged = judge(&prepared, &searched)?;
+    let judged = judge(&prepared, &searched, AcceptedBy::User)?;
     watch.unless_stopped()?;
     let mut found = prepared.evaluate(&searched, judged.clone())?;
     if case.wishes.search {

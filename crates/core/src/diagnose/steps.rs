@@ -48,8 +48,21 @@ impl PendingEffect {
     }
 }
 
+/// Who asked for the effects that stand whatever their size.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum AcceptedBy {
+    /// What cannot be had is refused.
+    User,
+    /// The search, to see what they would be.
+    Trial,
+}
+
 /// Settles the set, then asks held-out data.
-pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<JudgedEffects> {
+pub fn judge(
+    prepared: &PreparedCase,
+    searched: &SearchedCase,
+    by: AcceptedBy,
+) -> StepResult<JudgedEffects> {
     let fitted = prepared.blocks.list.len();
     let mut work = EffectJudge {
         prepared,
@@ -69,7 +82,9 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<Jud
         estimates = work.readmit(&mut ways)?;
         written = work.written(&ways, &estimates)?;
     }
-    let wanted = ways.iter().filter(|way| way.accepted);
+    let wanted = ways
+        .iter()
+        .filter(|way| way.accepted && by == AcceptedBy::User);
     let wanted = wanted.filter_map(|way| Some(&way.found.as_ref()?.effect));
     refuse_failed(prepared, &wanted.collect::<Vec<_>>(), &written.1)?;
     work.ask_those_that_left(&mut ways)?;

@@ -15,7 +15,7 @@ use crate::diagnose::problem::case::formula_name;
 use crate::diagnose::problem::pass::EffectCandidate;
 use crate::diagnose::search::ChosenCandidate;
 use crate::diagnose::searched::SearchedCase;
-use crate::diagnose::steps::judge;
+use crate::diagnose::steps::{AcceptedBy, judge};
 use crate::diagnose::tables::beside_the_others;
 use crate::effect::formula::{FormulaDefinition, FormulaShape};
 use crate::effect::{EffectPlace, ModelEffect, own};
@@ -43,7 +43,7 @@ impl PreparedCase<'_> {
         let all: Vec<&Proposed> = proposed.iter().collect();
         let mut formulas = Vec::new();
         if !all.is_empty() {
-            let (_, judged) = self.with_formulas(searched, confirmed, &all)?;
+            let (_, judged) = self.with_formulas(searched, confirmed, (&all, AcceptedBy::Trial))?;
             let first = judged.steps.len() - all.len();
             for (p, step) in all.iter().zip(&judged.steps[first..]) {
                 let mut found = self.found(searched, confirmed, p, step.clone());
@@ -69,7 +69,8 @@ impl PreparedCase<'_> {
             });
         }
         let some = !accepted.is_empty();
-        let accepted = some.then(|| self.with_formulas(searched, confirmed, &accepted));
+        let accepted =
+            some.then(|| self.with_formulas(searched, confirmed, (&accepted, AcceptedBy::User)));
         let accepted = accepted.transpose()?;
         Ok(SearchedFormulas { formulas, accepted })
     }
@@ -79,7 +80,7 @@ impl PreparedCase<'_> {
         &self,
         searched: &SearchedCase,
         confirmed: &[ChosenCandidate],
-        taken: &[&Proposed],
+        (taken, by): (&[&Proposed], AcceptedBy),
     ) -> Result<(SearchedCase, JudgedEffects), DiagnoseError> {
         let stays = |c: &&ChosenCandidate| {
             let same = |own: &ChosenCandidate| own.candidate == c.candidate;
@@ -122,7 +123,7 @@ impl PreparedCase<'_> {
             error: searched.error,
             determined: searched.determined,
         };
-        let judged = judge(self, &case)?;
+        let judged = judge(self, &case, by)?;
         Ok((case, judged))
     }
 
