@@ -43,6 +43,12 @@ impl<'p> TextEdits<'p> {
         self.pieces.push((at..at, text));
     }
 
+    /// Puts a text behind the end of an element.
+    pub(super) fn put_behind(&mut self, of: &Element, text: &str) {
+        let at = of.range().end;
+        self.pieces.push((at..at, text.to_owned()));
+    }
+
     /// Puts a text behind the begin of an element.
     pub(super) fn put_into(&mut self, of: &Element, text: &str) {
         let end = tag_end(self.plain, of.range().start);
