@@ -300,15 +300,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let folder = args.urdf_source.as_deref();
         let folder = folder.and_then(|source| folder_from(path, source));
         let into = |head: &[String]| {
-            let write = |source: &ReadFile<(String, RobotFile)>| {
-                let (text, robot) = &source.value;
+            let write = |source: &ReadFile<(String, [RobotFile; 2])>| {
+                let (text, robots) = &source.value;
                 let into = SourceText {
                     file: &source.name,
                     text,
                     names: &names,
                     folder: folder.as_deref(),
                 };
-                urdf_source::written(&arm, &into, robot, head)
+                urdf_source::written(&arm, &into, robots, head)
             };
             source.as_ref().map(write).transpose()
         };

@@ -76,15 +76,17 @@ pub(super) fn with_table<T>(
     Ok((write(&found)?, found))
 }
 /// A URDF that stands for the robot, and the robot that it is read as.
-pub(super) fn source(path: &Path) -> Result<ReadFile<(String, RobotFile)>, CliError> {
+pub(super) fn source(path: &Path) -> Result<ReadFile<(String, [RobotFile; 2])>, CliError> {
     let shown = escape(&path.to_string_lossy());
     let (file, text) = (file_name(path), config::text(path)?);
     let section = toml::Value::from(file.as_str());
     let robot = format!("[robot]\nmodel = \"serial\"\nurdf = {section}\n");
-    let robot = RobotFile::parse_in(&shown, &robot, path.parent())?;
+    let as_written = format!("{robot}angles_as_written = true\n");
+    let read = |robot: &str| RobotFile::parse_in(&shown, robot, path.parent());
+    let robots = [read(&robot)?, read(&as_written)?];
     Ok(ReadFile {
         provenance: Provenance::of_text(&file, &text),
-        value: (text, robot),
+        value: (text, robots),
         name: shown,
     })
 }

@@ -1,5 +1,6 @@
 //! SDFormat 1.9, as Gazebo reads it: links with inertials, joints with damping, friction and limits.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, OwnJoint};
@@ -20,6 +21,7 @@ const NONE: &str = "1e16";
 
 /// The text of a model in a world of its own, where gravity is the model's; `notes` stand at its head.
 pub fn sdf(arm: &Arm, notes: &[String]) -> String {
+    let arm = &with_names_apart(arm);
     let mut out = format!("<?xml version=\"1.0\"?>\n<!--\n{}", in_comment(notes));
     let root = quoted(&arm.root);
     let _ = write!(
@@ -64,6 +66,37 @@ pub fn sdf(arm: &Arm, notes: &[String]) -> String {
     }
     out.push_str("    </model>\n  </world>\n</sdf>\n");
     out
+}
+
+/// Links and frames that are called as a joint is are told from it, for in a model of SDF no two parts have one name.
+fn with_names_apart(arm: &Arm) -> Arm {
+    let mut arm = arm.clone();
+    let joints: BTreeSet<String> = arm.joints().iter().map(|j| j.name.clone()).collect();
+    let mut names: BTreeSet<String> = arm.links.iter().map(|link| link.name.clone()).collect();
+    names.extend(joints.iter().cloned());
+    names.extend(arm.frames.iter().map(|frame| frame.name.clone()));
+    let mut apart = |name: &str, kind: &str| {
+        let mut anew = format!("{name}_{kind}");
+        while !names.insert(anew.clone()) {
+            anew.push('_');
+        }
+        anew
+    };
+    let frames = arm.frames.iter_mut();
+    for frame in frames.filter(|frame| joints.contains(&frame.name)) {
+        frame.name = apart(&frame.name, "frame");
+    }
+    for i in 0..arm.links.len() {
+        let old = arm.links[i].name.clone();
+        if !joints.contains(&old) {
+            continue;
+        }
+        let anew = apart(&old, "link");
+        let frames = arm.frames.iter_mut().filter(|frame| frame.link == old);
+        frames.for_each(|frame| frame.link.clone_from(&anew));
+        arm.links[i].name = anew;
+    }
+    arm
 }
 
 fn joint(out: &mut String, link: &ArmLink, parent: &str) {

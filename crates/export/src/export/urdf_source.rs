@@ -21,6 +21,8 @@ struct UrdfWriting<'a> {
     /// The whole of the source as a robot.
     robot: &'a RobotFile,
     links: &'a [Link],
+    /// The same with their angles as the file writes them, which readers take.
+    as_written: &'a [Link],
     joints: &'a [String],
     /// Link there of each link of the model.
     found: Vec<usize>,
@@ -29,22 +31,23 @@ struct UrdfWriting<'a> {
     out: UrdfReplacement,
 }
 
-/// The text of a URDF with a model in it, `robot` being the robot that it is; `notes` stand at its head. Joints are matched by
-/// name, and each joint's frame must be that of the model.
+/// The text of a URDF with a model in it, `robots` being the robot that it is, with angles as they are meant and as they
+/// are written; `notes` stand at its head. Joints are matched by name, and each joint's frame must be that of the model.
 ///
 /// # Errors
 /// [`ExportError::OtherSource`] for a joint that is not there or sits elsewhere.
 pub fn written(
     arm: &Arm,
     source: &SourceText,
-    robot: &RobotFile,
+    [robot, as_written]: &[RobotFile; 2],
     notes: &[String],
 ) -> Result<WrittenSource, ExportError> {
-    let described = robot.robot();
+    let (described, as_written) = (robot.robot(), as_written.robot());
     let mut writing = UrdfWriting {
         source,
         robot,
         links: described.tree().links(),
+        as_written: as_written.tree().links(),
         joints: described.joint_names(),
         found: Vec::new(),
         stand: Vec::new(),
@@ -135,7 +138,7 @@ impl UrdfWriting<'_> {
                 index.ok_or_else(|| self.refused(problem(), "give the URDF of this robot"))?
             }
         };
-        let (parent, pose) = self.carried_by(index);
+        let (parent, pose) = self.carried_by(self.links, index);
         let there = &self.links[index];
         let joint = match &there.coordinate {
             Coordinate::Joint(j) => Some(self.joints[*j].clone()),
@@ -160,22 +163,28 @@ impl UrdfWriting<'_> {
         if let (ArmJoint::Fixed, Some(joint)) = (&link.joint, &there.joint) {
             self.held.insert(joint.clone(), rest(link, &there));
         }
+        let (rotation, origin) = self.carried_by(self.as_written, index).1;
         self.found.push(index);
-        self.stand.push(there);
+        self.stand.push(SourceLink {
+            rotation,
+            origin,
+            axis: self.as_written[index].axis,
+            ..there
+        });
         Ok(())
     }
 
     /// The model's link before one of the source, and the pose in it, joints between them at 0.
-    fn carried_by(&self, index: usize) -> (Option<usize>, Pose) {
-        let mut pose = (self.links[index].rotation, self.links[index].origin);
-        let mut next = self.links[index].parent;
+    fn carried_by(&self, links: &[Link], index: usize) -> (Option<usize>, Pose) {
+        let pose_of = |k: usize| (links[k].rotation, links[k].origin);
+        let mut pose = pose_of(index);
+        let mut next = links[index].parent;
         while let Some(k) = next {
             if let Some(link) = self.found.iter().position(|found| *found == k) {
                 return (Some(link), pose);
             }
-            let here = (self.links[k].rotation, self.links[k].origin);
-            pose = composed(&self.behind(here, k), &pose);
-            next = self.links[k].parent;
+            pose = composed(&self.behind(pose_of(k), k), &pose);
+            next = links[k].parent;
         }
         (None, pose)
     }
@@ -194,7 +203,7 @@ impl UrdfWriting<'_> {
     fn replace(&mut self, i: usize, link: &ArmLink) {
         let there = self.stand[i].clone();
         let hung: Vec<usize> = (0..self.links.len())
-            .filter(|k| !self.found.contains(k) && self.carried_by(*k).0 == Some(i))
+            .filter(|k| !self.found.contains(k) && self.carried_by(self.links, *k).0 == Some(i))
             .collect();
         let body = self.body_beside(link, &hung);
         self.out
@@ -226,7 +235,7 @@ impl UrdfWriting<'_> {
     fn body_beside(&mut self, link: &ArmLink, hung: &[usize]) -> Body {
         let weight = |k: &usize| {
             let given = self.robot.robot.link[*k].inertial.as_ref()?;
-            let pose = self.behind(self.carried_by(*k).1, *k);
+            let pose = self.behind(self.carried_by(self.links, *k).1, *k);
             Some(seen_from(&given.body(), &pose))
         };
         let bodies: Vec<Body> = hung.iter().filter_map(weight).collect();
