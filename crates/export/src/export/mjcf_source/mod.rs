@@ -357,31 +357,6 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
         Ok(())
     }
 
-    /// Puts what the robot is fixed to the world by into a body without a pose: of the outermost body Pinocchio skips it.
-    fn bases(&mut self) {
-        let bodies = &self.layout.bodies;
-        let outermost = |mut k: usize| {
-            while let Some(parent) = bodies[k].parent {
-                k = parent;
-            }
-            k
-        };
-        let bases: BTreeSet<usize> = self.found.iter().flatten().map(|k| outermost(*k)).collect();
-        for base in bases.into_iter().map(|k| &bodies[k]) {
-            if base.joints.is_empty() && base.pose != HERE {
-                self.edits.put_before(
-                    &base.element,
-                    format!("<body name=\"{}_fixed\">\n", base.name),
-                );
-                self.edits.put_behind(&base.element, "\n</body>");
-                self.notes.push(format!(
-                    "body {} stands in one without a pose, for Pinocchio skips that of the first",
-                    base.name
-                ));
-            }
-        }
-    }
-
     /// What is left for a link, where bodies hang on it that are in its mass: those that move keep theirs where the rest is a
     /// body, those that are fixed weigh nothing.
     fn body_beside(&mut self, link: &ArmLink, hung: &[usize]) -> Body {
