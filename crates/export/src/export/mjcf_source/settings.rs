@@ -6,7 +6,7 @@ use super::SourceWriting;
 use super::layout::ACTUATORS;
 use crate::export::mjcf::tendons;
 use crate::export::prepared::words;
-use crate::export::source_link::NEGLIGIBLE;
+use crate::export::source_link::{HERE, NEGLIGIBLE};
 use cft_ident_files::config::xml::Element;
 
 /// Attributes of the compiler that change bodies, with what is the same as none.
@@ -29,6 +29,31 @@ const FLAGS: [&str; 6] = [
 ];
 
 impl<'p, 't> SourceWriting<'_, 't, 'p> {
+    /// Puts what the robot is fixed to the world by into a body without a pose: of the outermost body Pinocchio skips it.
+    pub(super) fn bases(&mut self) {
+        let bodies = &self.layout.bodies;
+        let outermost = |mut k: usize| {
+            while let Some(parent) = bodies[k].parent {
+                k = parent;
+            }
+            k
+        };
+        let bases: BTreeSet<usize> = self.found.iter().flatten().map(|k| outermost(*k)).collect();
+        for base in bases.into_iter().map(|k| &bodies[k]) {
+            if base.joints.is_empty() && base.pose != HERE {
+                self.edits.put_before(
+                    &base.element,
+                    format!("<body name=\"{}_fixed\">\n", base.name),
+                );
+                self.edits.put_behind(&base.element, "\n</body>");
+                self.notes.push(format!(
+                    "body {} stands in one without a pose, for Pinocchio skips that of the first",
+                    base.name
+                ));
+            }
+        }
+    }
+
     /// Takes out what changes bodies while they are compiled; files of meshes stay where they are.
     pub(super) fn compilers(&mut self, root: Element<'p, 't>) {
         let all: Vec<Element> = root.children().filter(|e| e.name() == "compiler").collect();
