@@ -2,6 +2,7 @@
 //! rustc does, the URDF as it is read back.
 
 mod sources;
+mod sources_kept;
 mod urdf;
 mod world;
 

@@ -155,7 +155,10 @@ impl Machine {
         let text = std::fs::read_to_string(folder.join(model)).unwrap();
         let mut wide: toml::Table = text.parse().unwrap();
         let held = wide["held_out"].as_array().unwrap().clone();
-        let limits = wide["limits"].as_table_mut().unwrap();
+        let limits = wide
+            .entry("limits")
+            .or_insert_with(|| toml::Table::new().into());
+        let limits = limits.as_table_mut().unwrap();
         for joint in held {
             let limits = limits
                 .entry(joint["joint"].as_str().unwrap())

@@ -4,7 +4,7 @@
 use super::*;
 use predicates::str::contains;
 
-const ARM: &str = "<robot name=\"arm\"><link name=\"base\"/><link name=\"l1\"/><link name=\"l2\"/><link name=\"l3\"/>\
+pub(super) const ARM: &str = "<robot name=\"arm\"><link name=\"base\"/><link name=\"l1\"/><link name=\"l2\"/><link name=\"l3\"/>\
     <joint name=\"j1\" type=\"revolute\"><parent link=\"base\"/><child link=\"l1\"/><origin xyz=\"0 0 0.3\"/><axis xyz=\"0 0 1\"/></joint>\
     <joint name=\"j2\" type=\"revolute\"><parent link=\"l1\"/><child link=\"l2\"/><origin xyz=\"0 0.2 0\" rpy=\"0 1.5707963267948966 0\"/><axis xyz=\"0 1 0\"/></joint>\
     <joint name=\"j3\" type=\"revolute\"><parent link=\"l2\"/><child link=\"l3\"/><origin xyz=\"0.4 0 0\"/><axis xyz=\"0 1 0\"/></joint>MORE</robot>";
@@ -17,7 +17,7 @@ const BRANCHES: &str = "<link name=\"camera\"><inertial><origin xyz=\"0 0.04 0.0
     <link name=\"glass\"><inertial><mass value=\"0.01\"/><inertia ixx=\"0.0001\" iyy=\"0.0001\" izz=\"0.0001\"/></inertial></link>\
     <joint name=\"glued\" type=\"fixed\"><parent link=\"lens\"/><child link=\"glass\"/></joint>";
 
-const MJCF: &str = r#"<mujoco model="arm3"><compiler angle="degree"/>
+pub(super) const MJCF: &str = r#"<mujoco model="arm3"><compiler angle="degree"/>
   <default>
     <joint armature="0.1" damping="1" frictionloss="0.2"/>
     <default class="wrist"><joint armature="0.05" axis="0 1 0"/></default>
@@ -43,12 +43,12 @@ const MJCF: &str = r#"<mujoco model="arm3"><compiler angle="degree"/>
 "#;
 
 /// A folder with a model of the arm.
-struct Bench {
-    folder: tempfile::TempDir,
+pub(super) struct Bench {
+    pub(super) folder: tempfile::TempDir,
 }
 
 impl Bench {
-    fn of(urdf: &str) -> Self {
+    pub(super) fn of(urdf: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("arm.urdf"), urdf).unwrap();
         let robot = "[robot]\nmodel = \"serial\"\nurdf = \"arm.urdf\"\n";
@@ -58,7 +58,7 @@ impl Bench {
         Self { folder }
     }
 
-    fn arm() -> Self {
+    pub(super) fn arm() -> Self {
         Self::of(&ARM.replace("MORE", ""))
     }
 
@@ -66,7 +66,7 @@ impl Bench {
         std::fs::write(self.folder.path().join(name), text).unwrap();
     }
 
-    fn export(&self, line: &str) -> assert_cmd::assert::Assert {
+    pub(super) fn export(&self, line: &str) -> assert_cmd::assert::Assert {
         let mut command = assert_cmd::Command::cargo_bin("cft-ident").unwrap();
         command
             .current_dir(self.folder.path())
@@ -75,7 +75,7 @@ impl Bench {
     }
 
     /// The MJCF with the model in it.
-    fn mjcf_from(&self, source: &str) -> String {
+    pub(super) fn mjcf_from(&self, source: &str) -> String {
         self.write("source.xml", source);
         self.export("--mjcf out.xml --mjcf-source source.xml")
             .success();
@@ -478,47 +478,4 @@ fn a_tip_keeps_what_is_fixed_to_it_and_what_hangs_on_its_chain() {
         .map(|frame| frame.name.as_str())
         .collect();
     assert_eq!(frames, ["hand"]);
-}
-
-#[test]
-fn the_base_of_an_mjcf_keeps_its_pose_where_the_first_body_has_none() {
-    let bench = Bench::arm();
-    let placed = MJCF
-        .replace(
-            "<body name=\"l1\" pos=\"0 0 0.3\">",
-            "<body name=\"desk\" pos=\"0 0 1\"><body name=\"l1\" pos=\"0 0 -0.7\">",
-        )
-        .replace("</worldbody>", "</body></worldbody>");
-    let out = bench.mjcf_from(&placed);
-    assert!(out.contains("<body name=\"desk_fixed\">\n<body name=\"desk\" pos=\"0 0 1\">"));
-    assert!(out.contains("body desk stands in one without a pose"));
-    // a base without a pose stays as it is
-    let bare = bench.mjcf_from(MJCF);
-    assert!(!bare.contains("_fixed"), "{bare}");
-}
-
-#[test]
-fn angles_of_a_urdf_stay_as_they_are_written_and_what_they_cost_is_said() {
-    let bench = Bench::of(
-        &ARM.replace("1.5707963267948966", "1.5708")
-            .replace("MORE", ""),
-    );
-    let export = bench.export("--urdf out.urdf --urdf-source arm.urdf");
-    export.success();
-    let out = std::fs::read_to_string(bench.folder.path().join("out.urdf")).unwrap();
-    assert!(out.contains("rpy=\"0 1.5708 0\""), "{out}");
-    assert!(
-        out.contains("frames of the source, which are rounded"),
-        "{out}"
-    );
-}
-
-#[test]
-fn no_two_parts_of_an_sdf_have_one_name() {
-    let twice = ARM.replace("\"l3\"", "\"j3\"").replace("MORE", "");
-    let bench = Bench::of(&twice);
-    bench.export("--sdf out.sdf").success();
-    let out = std::fs::read_to_string(bench.folder.path().join("out.sdf")).unwrap();
-    assert!(out.contains("<link name=\"j3_link\">"), "{out}");
-    assert!(out.contains("<child>j3_link</child>") && out.contains("<joint name=\"j3\""));
 }
