@@ -1,20 +1,19 @@
 //! What the user wants, after the fit: it is there and the fit came out, or it is refused.
 
 use super::error::DiagnoseError;
+use super::outcome::JudgedEffects;
 use super::prepared::PreparedCase;
 use super::problem::case::AcceptedEffect;
 use super::problem::data_split::LogRole;
-use crate::effect::{AugmentedModel, ModelEffect};
+use crate::effect::ModelEffect;
 use crate::explain::ErrorText;
 use crate::number;
 
 /// Refuses effects that the user wants where nothing comes of them: no size beside the others, numbers that no file may
 /// hold, or a model that leaves more of the rows that it was fitted to than the given one.
-pub fn refuse_failed(
-    prepared: &PreparedCase,
-    wanted: &[&ModelEffect],
-    written: &AugmentedModel,
-) -> Result<(), DiagnoseError> {
+pub fn refuse_failed(prepared: &PreparedCase, judged: &JudgedEffects) -> Result<(), DiagnoseError> {
+    let wanted = judged.steps.iter().filter(|step| step.accepted_by_user);
+    let wanted: Vec<&ModelEffect> = wanted.map(|step| &step.estimate).collect();
     if wanted.is_empty() {
         return Ok(());
     }
@@ -30,7 +29,7 @@ pub fn refuse_failed(
         return Err(refused(name(effect), why.to_owned()));
     }
     let rows = prepared.held_out(LogRole::Train);
-    let Some(change) = rows.change([&case.in_use, written])? else {
+    let Some(change) = rows.change([&case.in_use, &judged.written])? else {
         return Ok(());
     };
     let [before, after] = change.mean;

@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::accepted::refuse_failed;
 use super::change::friction_changes;
 use super::error::DiagnoseError;
 use super::outcome::JudgedEffects;
@@ -13,7 +14,7 @@ use super::problem::constant_columns::ConstantColumns;
 use super::problem::data_split::{DataSplit, LogRole};
 use super::refit::ModelRefit;
 use super::searched::SearchedCase;
-use super::steps::{AcceptedBy, judge};
+use super::steps::judge;
 use super::unexplained::dependence::{ModelResiduals, dependences};
 use super::unexplained::noise_floor::floor;
 use super::unexplained::{part_unexplained, unexplained};
@@ -39,7 +40,8 @@ pub fn diagnose(
     watch.unless_stopped()?;
     let searched = prepared.search(watch)?;
     watch.unless_stopped()?;
-    let judged = judge(&prepared, &searched, AcceptedBy::User)?;
+    let judged = judge(&prepared, &searched)?;
+    refuse_failed(&prepared, &judged)?;
     watch.unless_stopped()?;
     let mut found = prepared.evaluate(&searched, judged.clone())?;
     if case.wishes.search {

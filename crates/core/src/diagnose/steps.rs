@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::accepted::refuse_failed;
 use super::candidates::no_finding;
 use super::error::DiagnoseError;
 use super::held_out::{EffectChange, HeldOutRows};
@@ -48,21 +47,8 @@ impl PendingEffect {
     }
 }
 
-/// Who asked for the effects that stand whatever their size.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum AcceptedBy {
-    /// What cannot be had is refused.
-    User,
-    /// The search, to see what they would be.
-    Trial,
-}
-
 /// Settles the set, then asks held-out data.
-pub fn judge(
-    prepared: &PreparedCase,
-    searched: &SearchedCase,
-    by: AcceptedBy,
-) -> StepResult<JudgedEffects> {
+pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<JudgedEffects> {
     let fitted = prepared.blocks.list.len();
     let mut work = EffectJudge {
         prepared,
@@ -82,11 +68,6 @@ pub fn judge(
         estimates = work.readmit(&mut ways)?;
         written = work.written(&ways, &estimates)?;
     }
-    let wanted = ways
-        .iter()
-        .filter(|way| way.accepted && by == AcceptedBy::User);
-    let wanted = wanted.filter_map(|way| Some(&way.found.as_ref()?.effect));
-    refuse_failed(prepared, &wanted.collect::<Vec<_>>(), &written.1)?;
     work.ask_those_that_left(&mut ways)?;
     work.held_out(&mut ways, &written.1)?;
     Ok(work.described(&ways, &estimates, (judge.1, written)))

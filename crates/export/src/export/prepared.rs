@@ -1,5 +1,7 @@
 //! A model as links with inertials: what URDF, MJCF, SDF and USD have in common.
 
+use std::collections::BTreeSet;
+
 use super::error::ExportError;
 use super::single;
 use super::standard::{StandardParameters, nearest};
@@ -84,6 +86,20 @@ pub(super) fn placed(link: &Link, drive: &Drive) -> (Rotation, Vector) {
             (rotation, add(&origin, &moved))
         }
         _ => (rotation, origin),
+    }
+}
+
+/// Names that are given away, each once.
+#[derive(Default)]
+pub(super) struct UsedNames(pub(super) BTreeSet<String>);
+
+impl UsedNames {
+    /// Gives a name away, with underscores behind it where it is taken.
+    pub(super) fn give(&mut self, mut name: String) -> String {
+        while !self.0.insert(name.clone()) {
+            name.push('_');
+        }
+        name
     }
 }
 

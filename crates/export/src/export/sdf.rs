@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, OwnJoint};
-use super::prepared::{MOMENTS, in_comment, quoted, words};
+use super::prepared::{MOMENTS, UsedNames, in_comment, quoted, words};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::roll_pitch_yaw;
 
@@ -71,30 +71,30 @@ pub fn sdf(arm: &Arm, notes: &[String]) -> String {
 /// Links and frames that are called as a joint is are told from it, for in a model of SDF no two parts have one name.
 fn with_names_apart(arm: &Arm) -> Arm {
     let mut arm = arm.clone();
-    let joints: BTreeSet<String> = arm.joints().iter().map(|j| j.name.clone()).collect();
-    let mut names: BTreeSet<String> = arm.links.iter().map(|link| link.name.clone()).collect();
-    names.extend(joints.iter().cloned());
-    names.extend(arm.frames.iter().map(|frame| frame.name.clone()));
-    let mut apart = |name: &str, kind: &str| {
-        let mut anew = format!("{name}_{kind}");
-        while !names.insert(anew.clone()) {
-            anew.push('_');
+    let joints = arm.links.iter().filter_map(|link| match &link.joint {
+        ArmJoint::Own(joint) => Some(joint.name.clone()),
+        ArmJoint::Mimic { name, .. } => Some(name.clone()),
+        ArmJoint::Fixed => None,
+    });
+    let joints: BTreeSet<String> = joints.collect();
+    let links = arm.links.iter().map(|link| &link.name);
+    let frames = arm.frames.iter().map(|frame| &frame.name);
+    let others = links.chain(frames).chain([&arm.root]).cloned();
+    let mut names = UsedNames(joints.iter().cloned().chain(others).collect());
+    let mut told_apart = |name: &mut String, kind: &str| {
+        if joints.contains(name) {
+            *name = names.give(format!("{name}_{kind}"));
         }
-        anew
     };
-    let frames = arm.frames.iter_mut();
-    for frame in frames.filter(|frame| joints.contains(&frame.name)) {
-        frame.name = apart(&frame.name, "frame");
+    for frame in &mut arm.frames {
+        told_apart(&mut frame.name, "frame");
     }
-    for i in 0..arm.links.len() {
-        let old = arm.links[i].name.clone();
-        if !joints.contains(&old) {
-            continue;
-        }
-        let anew = apart(&old, "link");
-        let frames = arm.frames.iter_mut().filter(|frame| frame.link == old);
-        frames.for_each(|frame| frame.link.clone_from(&anew));
-        arm.links[i].name = anew;
+    let links = arm.links.iter_mut().map(|link| &mut link.name);
+    for link in links.chain([&mut arm.root]) {
+        let old = link.clone();
+        told_apart(link, "link");
+        let carried = arm.frames.iter_mut().filter(|frame| frame.link == old);
+        carried.for_each(|frame| frame.link.clone_from(link));
     }
     arm
 }

@@ -183,20 +183,10 @@ impl UrdfWriting<'_> {
             if let Some(link) = self.found.iter().position(|found| *found == k) {
                 return (Some(link), pose);
             }
-            pose = composed(&self.behind(pose_of(k), k), &pose);
+            pose = composed(&behind(pose_of(k), &links[k]), &pose);
             next = links[k].parent;
         }
         (None, pose)
-    }
-
-    /// A frame behind the joint of a link that stands at 0, or at its offset where it follows one that does.
-    fn behind(&self, frame: Pose, index: usize) -> Pose {
-        let link = &self.links[index];
-        let at = match &link.coordinate {
-            Coordinate::Joint(_) => 0.0,
-            Coordinate::Follows(follows) => follows.offset,
-        };
-        displaced(&frame, link.kind, &link.axis, at)
     }
 
     /// Inertial and friction of one link, and what hangs on it beside the model.
@@ -235,7 +225,7 @@ impl UrdfWriting<'_> {
     fn body_beside(&mut self, link: &ArmLink, hung: &[usize]) -> Body {
         let weight = |k: &usize| {
             let given = self.robot.robot.link[*k].inertial.as_ref()?;
-            let pose = self.behind(self.carried_by(self.links, *k).1, *k);
+            let pose = behind(self.carried_by(self.links, *k).1, &self.links[*k]);
             Some(seen_from(&given.body(), &pose))
         };
         let bodies: Vec<Body> = hung.iter().filter_map(weight).collect();
@@ -257,6 +247,15 @@ impl UrdfWriting<'_> {
         }
         rest.unwrap_or(link.body)
     }
+}
+
+/// A frame behind the joint of a link that stands at 0, or at its offset where it follows one that does.
+fn behind(frame: Pose, link: &Link) -> Pose {
+    let at = match &link.coordinate {
+        Coordinate::Joint(_) => 0.0,
+        Coordinate::Follows(follows) => follows.offset,
+    };
+    displaced(&frame, link.kind, &link.axis, at)
 }
 
 /// What became of the bodies that hang on a link beside the model.

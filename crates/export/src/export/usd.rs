@@ -1,11 +1,10 @@
 //! OpenUSD as text, with the physics schemas that Isaac Sim and newton read: rigid bodies with mass properties, joints
 //! with armature, friction and damping of PhysX and of newton. Numbers of bodies are of single precision there.
 
-use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::arm::{Arm, ArmJoint, ArmLink, FormatSupport, OwnJoint, principal, quaternion, z_to};
-use super::prepared::hashed;
+use super::prepared::{UsedNames, hashed};
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::tree::space::{Rotation, UNTURNED, Vector, add, product, turn};
 
@@ -18,7 +17,8 @@ pub const SAYS: FormatSupport = FormatSupport {
 };
 
 /// Names of prims: letters, digits and underscores, each once.
-struct PrimNames(BTreeSet<String>);
+#[derive(Default)]
+struct PrimNames(UsedNames);
 
 impl PrimNames {
     fn name(&mut self, name: &str) -> String {
@@ -27,10 +27,7 @@ impl PrimNames {
         if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
             name.insert(0, '_');
         }
-        while !self.0.insert(name.clone()) {
-            name.push('_');
-        }
-        name
+        self.0.give(name)
     }
 }
 
@@ -54,7 +51,7 @@ pub fn usd(arm: &Arm, notes: &[String]) -> String {
     );
     out += &hashed(notes);
     let standing = arm.standing();
-    let mut prims = PrimNames(BTreeSet::new());
+    let mut prims = PrimNames::default();
     let scene = prims.name("scene");
     let root = prims.name(&arm.root);
     let bodies: Vec<String> = arm.links.iter().map(|l| prims.name(&l.name)).collect();

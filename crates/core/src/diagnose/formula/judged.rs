@@ -4,6 +4,7 @@
 use super::Proposed;
 use super::picture::OnHeldOut;
 use super::term::{FormulaTerm, ShapeNumber, Source, TermNames, named};
+use crate::diagnose::accepted::refuse_failed;
 use crate::diagnose::candidates::refined_shapes;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::outcome::JudgedEffects;
@@ -15,7 +16,7 @@ use crate::diagnose::problem::case::formula_name;
 use crate::diagnose::problem::pass::EffectCandidate;
 use crate::diagnose::search::ChosenCandidate;
 use crate::diagnose::searched::SearchedCase;
-use crate::diagnose::steps::{AcceptedBy, judge};
+use crate::diagnose::steps::judge;
 use crate::diagnose::tables::beside_the_others;
 use crate::effect::formula::{FormulaDefinition, FormulaShape};
 use crate::effect::{EffectPlace, ModelEffect, own};
@@ -43,7 +44,7 @@ impl PreparedCase<'_> {
         let all: Vec<&Proposed> = proposed.iter().collect();
         let mut formulas = Vec::new();
         if !all.is_empty() {
-            let (_, judged) = self.with_formulas(searched, confirmed, (&all, AcceptedBy::Trial))?;
+            let (_, judged) = self.with_formulas(searched, confirmed, &all)?;
             let first = judged.steps.len() - all.len();
             for (p, step) in all.iter().zip(&judged.steps[first..]) {
                 let mut found = self.found(searched, confirmed, p, step.clone());
@@ -69,9 +70,11 @@ impl PreparedCase<'_> {
             });
         }
         let some = !accepted.is_empty();
-        let accepted =
-            some.then(|| self.with_formulas(searched, confirmed, (&accepted, AcceptedBy::User)));
+        let accepted = some.then(|| self.with_formulas(searched, confirmed, &accepted));
         let accepted = accepted.transpose()?;
+        if let Some((_, judged)) = &accepted {
+            refuse_failed(self, judged)?;
+        }
         Ok(SearchedFormulas { formulas, accepted })
     }
 
@@ -80,7 +83,7 @@ impl PreparedCase<'_> {
         &self,
         searched: &SearchedCase,
         confirmed: &[ChosenCandidate],
-        (taken, by): (&[&Proposed], AcceptedBy),
+        taken: &[&Proposed],
     ) -> Result<(SearchedCase, JudgedEffects), DiagnoseError> {
         let stays = |c: &&ChosenCandidate| {
             let same = |own: &ChosenCandidate| own.candidate == c.candidate;
@@ -123,7 +126,7 @@ impl PreparedCase<'_> {
             error: searched.error,
             determined: searched.determined,
         };
-        let judged = judge(self, &case, by)?;
+        let judged = judge(self, &case)?;
         Ok((case, judged))
     }
 

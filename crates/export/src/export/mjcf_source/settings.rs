@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::SourceWriting;
 use super::layout::ACTUATORS;
 use crate::export::mjcf::tendons;
-use crate::export::prepared::words;
+use crate::export::prepared::{UsedNames, words};
 use crate::export::source_link::{HERE, NEGLIGIBLE};
 use cft_ident_files::config::xml::Element;
 
@@ -39,12 +39,13 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
             k
         };
         let bases: BTreeSet<usize> = self.found.iter().flatten().map(|k| outermost(*k)).collect();
+        let names = bodies.iter().map(|body| body.name.to_owned());
+        let mut names = UsedNames(names.collect());
         for base in bases.into_iter().map(|k| &bodies[k]) {
             if base.joints.is_empty() && base.pose != HERE {
-                self.edits.put_before(
-                    &base.element,
-                    format!("<body name=\"{}_fixed\">\n", base.name),
-                );
+                let around = names.give(format!("{}_fixed", base.name));
+                let begin = format!("<body name=\"{around}\">\n");
+                self.edits.put_before(&base.element, begin);
                 self.edits.put_behind(&base.element, "\n</body>");
                 self.notes.push(format!(
                     "body {} stands in one without a pose, for Pinocchio skips that of the first",
