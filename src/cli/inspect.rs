@@ -166,9 +166,9 @@ fn compare(
     let mut comparison = OrderComparison::new(n);
     let changes = comparison.changes().to_vec();
     let log = LogData::read(setup, &spec.into(), &context.control)?;
-    let mut log = log.open(&context.control)?;
+    let mut blocks = log.blocks(&context.control)?;
     let summary = motion::run(
-        &mut |block| log.read(block),
+        &mut |block| blocks.read(block),
         n,
         &setup.settings(),
         None,

@@ -75,7 +75,6 @@ pub use crate::input::in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use crate::input::log::Log;
 pub use crate::input::log_data::LogData;
 pub use crate::input::model::{new_model, refined, refined_or_friction};
-pub use crate::input::open_log::OpenLog;
 pub use crate::input::position_cutoff::PositionCutoff;
 pub use crate::input::reduced::{
     FORMAT, FrictionGiven, MadeWith, ReducedError, ReducedLog, ReducedLogs, is_reduced,

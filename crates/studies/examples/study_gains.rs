@@ -127,10 +127,12 @@ fn linear(machine: &RobotSetup, logs: [&Log; 2], mass: f64, control: &Control) -
     };
     let read = |log: &Log| -> BlockFactors {
         let read = LogData::read(machine, log, control).expect("a log");
-        let mut open = read.open(control).expect("a log");
-        accumulate(robot, &columns, &machine.settings(), &mut |b| open.read(b))
-            .expect("rows")
-            .0
+        let mut blocks = read.blocks(control).expect("a log");
+        accumulate(robot, &columns, &machine.settings(), &mut |b| {
+            blocks.read(b)
+        })
+        .expect("rows")
+        .0
     };
     let sets = logs.map(read);
     let map = robot.standard_map();

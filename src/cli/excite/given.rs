@@ -57,17 +57,17 @@ pub(super) fn add(
     let logs = RobotSetup::new(name, bench.file.clone());
     let control = &bench.context.control;
     let log = LogData::read_positions(&logs, &Log::from(&spec), control)?;
-    let mut log = log.open(control)?;
+    let mut blocks = log.blocks(control)?;
     let (sums, summary) = accumulate(
         &logs.robot,
         &bench.machine.columns,
         &logs.settings(),
-        &mut |block| log.read(block),
+        &mut |block| blocks.read(block),
     )
     .map_err(|error| IdentifyError::of_run(&spec.name(), error))?;
-    let notes = log.notes_with(&summary);
+    let notes = log.notes_with(&blocks, &summary);
     warnings.extend(notes.iter().map(ToString::to_string));
-    bench.inputs.push(log.provenance()?);
+    bench.inputs.push(blocks.provenance()?);
     given.add_log(&sums, summary.samples as f64);
     Ok(())
 }

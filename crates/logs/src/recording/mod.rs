@@ -251,6 +251,7 @@ impl Recording {
             cutter: self.cutter.clone(),
             hold: None,
             torque_offset: None,
+            stop: None,
         })
     }
 
@@ -314,21 +315,42 @@ fn parsed(
     Ok(RecordedRows::Parsed(spec.clone(), store, layout.clone()))
 }
 
+/// Says whether reading is to end.
+pub type StopCheck = dyn Fn() -> bool + Send + Sync;
+
 /// One way along a recording.
-#[derive(Debug)]
 pub struct RowBlocks {
     reader: Reader,
     cutter: RowCutter,
     hold: Option<(Robot, ZeroOrderHold)>,
     torque_offset: Option<Arc<TorqueCourse>>,
+    stop: Option<Arc<StopCheck>>,
 }
 
 impl RowBlocks {
-    /// The next rows, none of them marked bad; false, and no row, at the end. A block may be empty before that.
+    /// The same, ended with [`LogError::Interrupted`] where `stop` says so; it is asked before each block.
+    pub fn stopped_by(self, stop: Option<Arc<StopCheck>>) -> Self {
+        Self { stop, ..self }
+    }
+
+    /// The next rows, none of them marked bad; false, and no row, at the end.
     ///
     /// # Errors
     /// A file that can no longer be read.
     pub fn read(&mut self, block: &mut Block) -> Result<bool, LogError> {
+        loop {
+            if self.stop.as_ref().is_some_and(|stop| stop()) {
+                return Err(LogError::Interrupted);
+            }
+            let more = self.read_marked(block)?;
+            if !more || !block.is_empty() {
+                return Ok(more);
+            }
+        }
+    }
+
+    /// One block of the reader; empty where all its rows are marked bad.
+    fn read_marked(&mut self, block: &mut Block) -> Result<bool, LogError> {
         let more = self.reader.read(block)?;
         if let Some((robot, hold)) = &mut self.hold {
             hold.centre(robot, block);
@@ -349,13 +371,16 @@ impl RowBlocks {
         &self.reader
     }
 
+    /// Name, span, checksum and size of what was read so far.
+    ///
+    /// # Errors
+    /// A file that can no longer be read.
+    pub fn provenance(&self) -> Result<Provenance, LogError> {
+        self.reader.provenance()
+    }
+
     /// Rows that were taken out as bad so far.
     pub fn removed(&self) -> u64 {
         self.cutter.removed()
-    }
-
-    /// Whether torques come from a zero-order hold and so are means of two rows here.
-    pub fn is_centred(&self) -> bool {
-        self.hold.is_some()
     }
 }

@@ -146,15 +146,15 @@ fn sampled(
     let mut thinner = Thinner::new(n);
     let mut channels: Option<Channels> = None;
     for (index, log) in logs.iter().enumerate() {
-        let mut open = log.open(control)?;
-        let of_log = channels_of(setup, log, open.layout());
+        let mut blocks = log.blocks(control)?;
+        let of_log = channels_of(setup, log, blocks.reader().layout());
         if of_log.drive == Drive::Motors {
             // positions that belong to no pose are what is looked for
-            open = log.open_channels(control)?;
+            blocks = log.logged_blocks(control)?;
         }
         channels.get_or_insert(of_log);
         let run = motion::run(
-            &mut |block| open.read(block),
+            &mut |block| blocks.read(block),
             n,
             &settings,
             None,
@@ -169,7 +169,7 @@ fn sampled(
             },
             &mut |row| thinner.add(index, row.t, row.filtered),
         );
-        run.map_err(|error| open.ended(error))?;
+        run.map_err(|error| log.to_stage_error(&blocks, error))?;
     }
     Ok((channels.ok_or(IdentifyError::NoLog)?, thinner.finish()))
 }

@@ -35,14 +35,14 @@ pub(crate) fn fold_instruments(
     let mut total: Option<(BlockFactors, SimulatedLoop)> = None;
     for (index, log) in rows.recorded() {
         let settings = rows.settings_of(index, reading);
-        let mut open = log.open(rows.control)?;
+        let mut blocks = log.blocks(rows.control)?;
         let mut logged = log.references()?;
         let reference = match logged {
             Some(_) => ReferenceSource::Logged,
             None => ReferenceSource::Smoothed,
         };
         let mut source = |block: &mut Block| {
-            let more = open.read(block)?;
+            let more = blocks.read(block)?;
             if let Some(logged) = &mut logged {
                 logged.widen(block)?;
             }

@@ -5,7 +5,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-use crate::input::control::Control;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::robot_setup::RobotSetup;
@@ -74,13 +73,12 @@ impl FrictionBefore {
         data: &Dataset,
         (name, file): (&str, &ModelFile),
         (estimator, hold): (EstimatorKind, bool),
-        control: &Control,
     ) -> Result<Self, IdentifyError> {
         let mut given = Vec::new();
         if !hold {
             given.extend(data.reduced.iter().map(|part| part.provenance.clone()));
             for log in &data.logs {
-                given.push(log.open(control)?.provenance()?);
+                given.push(log.usable()?.identity()?);
             }
         }
         let mut before = FrictionBefore {

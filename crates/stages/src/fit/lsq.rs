@@ -24,7 +24,7 @@ pub fn lsq(
     settings: &LsqSettings,
     control: &Control,
 ) -> Result<IdentifiedDynamics, IdentifyError> {
-    let problem = LsqProblem::new(data, settings, control)?;
+    let problem = LsqProblem::new(data, settings)?;
     let smoothing = choose_smoothing(data, &problem.columns.known_laws(), control)?;
     let mut rows = LsqRows::new(data, smoothing, control);
     let estimate = problem.estimate(&mut rows)?;

@@ -3,7 +3,6 @@
 use super::estimate::{InertialEstimate, estimate};
 use super::gains::CurrentGains;
 use super::known_friction::FrictionBefore;
-use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
 use crate::input::gain_error::GainError;
@@ -55,11 +54,7 @@ impl<'a> LsqProblem<'a> {
     ///
     /// # Errors
     /// Settings that contradict the robot file or the logs, and rows that are given twice.
-    pub fn new(
-        data: &'a Dataset,
-        settings: &'a LsqSettings<'a>,
-        control: &Control,
-    ) -> Result<Self, IdentifyError> {
+    pub fn new(data: &'a Dataset, settings: &'a LsqSettings<'a>) -> Result<Self, IdentifyError> {
         let (setup, estimator) = (&data.setup, settings.estimator);
         setup.check_gains()?;
         each_row_once(&[("fit", fitted_identities(data))])?;
@@ -82,7 +77,7 @@ impl<'a> LsqProblem<'a> {
             settings.hold_friction || estimator == EstimatorKind::Ols || !data.reduced.is_empty();
         let before = settings.friction.map(|given| {
             let given = (given.name.as_str(), &given.file);
-            FrictionBefore::of(data, given, (estimator, hold), control)
+            FrictionBefore::of(data, given, (estimator, hold))
         });
         let before = before.transpose()?;
         let known = before.as_ref().map(|before| before.known.as_slice());

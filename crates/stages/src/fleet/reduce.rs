@@ -51,8 +51,7 @@ pub fn reduce(
             estimator: "reduce",
         });
     }
-    let before =
-        friction.map(|given| FrictionBefore::of(data, given, (EstimatorKind::Wls, true), control));
+    let before = friction.map(|given| FrictionBefore::of(data, given, (EstimatorKind::Wls, true)));
     let known = before.transpose()?.map(|before| before.known);
     let made_with = MadeWith::of(&setup.file, friction.map(|f| f.0).zip(known.as_deref()));
     let made_with = Arc::new(made_with);

@@ -4,6 +4,7 @@
 use crate::band::{self, Deviation, Directions, Error, Folds, FreeColumns, held_out, without_each};
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
+use crate::input::in_memory::count_run_time;
 use crate::input::log_data::LogData;
 use crate::input::position_cutoff::known;
 use crate::input::repeated::unseen_by;
@@ -91,10 +92,10 @@ pub(crate) fn on_other_logs(
     let setup = &setup.with_position_cutoffs(logs, &known(&model.model), control)?;
     let mut inputs = Vec::new();
     for log in logs {
-        let mut open = log.open(control)?;
+        let mut blocks = log.blocks(control)?;
         let mut block = Block::default();
-        while open.read(&mut block)? {}
-        inputs.push(open.provenance()?);
+        while blocks.read(&mut block)? {}
+        inputs.push(blocks.provenance()?);
     }
     unseen_by((name, file), &inputs)?;
     let held = Trial::new(setup, (file, model), (logs, &inputs), control).run(1)?;
@@ -113,17 +114,17 @@ pub(crate) fn read_pieces(
     let pieces = Pieces::of_each(MOST_ROWS, inputs);
     let mut all = Vec::new();
     for ((index, log), pieces) in logs.iter().enumerate().zip(&pieces) {
-        let mut open = log.open(control)?;
+        let mut blocks = log.blocks(control)?;
         let mut first = None;
         let (mut found, _) = stretches(index, n, settings, &mut |block| {
-            let more = open.read(block)?;
+            let more = blocks.read(block)?;
             if let Some(t) = block.t.first() {
                 pieces.keep(block, *first.get_or_insert(*t));
             }
             Ok(more)
         })
-        .map_err(|e| open.ended(e))?;
-        open.count_run_time(&mut found);
+        .map_err(|e| log.to_stage_error(&blocks, e))?;
+        count_run_time(&mut found, &blocks);
         if model.takes_temperatures() {
             let temperatures = setup.temperatures_for(model, log)?;
             for stretch in &mut found {
@@ -289,7 +290,7 @@ impl<'a> Trial<'a> {
         let mut quiet = QuietTorques::default();
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
-            let mut open = log.open(self.control)?;
+            let mut blocks = log.blocks(self.control)?;
             let temperatures = (self.setup).temperatures_for(self.model, log)?;
             let mut watched: Vec<Watched> = (models.iter().enumerate())
                 .map(|(fold, model)| Watched::new((index, fold), (model, &uncertain), &settings))
@@ -300,7 +301,7 @@ impl<'a> Trial<'a> {
             }
             let (mut block, mut first, mut more) = (Block::default(), None, true);
             while more {
-                more = open.read(&mut block)?;
+                more = blocks.read(&mut block)?;
                 if let Some(t) = block.t.first() {
                     let first = *first.get_or_insert(*t);
                     self.observed[index].keep(&mut block, first);

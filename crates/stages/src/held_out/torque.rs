@@ -75,8 +75,8 @@ pub fn torque(
         ..setup.settings()
     };
     let work = control.begin("torque", None);
-    let mut open = log.open(control)?;
-    let origin = open.origin();
+    let mut blocks = log.blocks(control)?;
+    let origin = log.recording().origin();
     let mut peak = vec![0.0f64; n];
     let mut square = vec![0.0f64; n];
     let mut emit = |t: f64, [q, v]: [&[f64]; 2], values: &[f64]| {
@@ -89,7 +89,7 @@ pub fn torque(
         }
         row(t, values, origin);
     };
-    let mut read = |block: &mut _| open.read(block);
+    let mut read = |block: &mut _| blocks.read(block);
     let failed = |e| IdentifyError::of_run(&log.name(), e);
     let summary = if refined.effects.is_empty() {
         let compute = |s: &motion::MotionSample, out: &mut [f64]| {
@@ -131,9 +131,9 @@ pub fn torque(
     };
     drop(work);
     control.check()?;
-    let mut notes = open.notes_with(&summary);
+    let mut notes = log.notes_with(&blocks, &summary);
     notes.extend(StageNote::of_reach(reach.as_ref()));
-    let inputs = vec![open.provenance()?];
+    let inputs = vec![blocks.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let names = setup.robot.joint_names().iter().enumerate();
     let joints = names.map(|(j, joint)| JointAlong {

@@ -262,16 +262,16 @@ fn reconstruct(
     }
     for log in logs {
         if refined.effects.is_empty() {
-            let mut open = log.open(control)?;
-            let origin = open.origin();
+            let mut blocks = log.blocks(control)?;
+            let origin = log.recording().origin();
             all.count_from(origin.seconds());
             let summary = all
-                .add(&settings, &mut |block| open.read(block), &mut |r| {
+                .add(&settings, &mut |block| blocks.read(block), &mut |r| {
                     row(r, origin)
                 })
-                .map_err(|e| open.ended(e))?;
-            notes.extend(open.notes_with(&summary));
-            inputs.push(open.provenance()?);
+                .map_err(|e| log.to_stage_error(&blocks, e))?;
+            notes.extend(log.notes_with(&blocks, &summary));
+            inputs.push(blocks.provenance()?);
             last = Some(summary);
         } else {
             // effects remember: they need a stretch from its begin

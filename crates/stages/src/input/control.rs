@@ -4,6 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::error::IdentifyError;
+use cft_ident_logs::recording::StopCheck;
 
 /// What a stage says while it works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,8 +21,6 @@ pub enum Progress<'a> {
     Note(&'a str),
 }
 
-/// Says whether work is to end.
-type StopCheck = dyn Fn() -> bool + Send + Sync;
 /// Is told of the progress of work.
 type ProgressListener = dyn Fn(Progress) + Send + Sync;
 
@@ -44,6 +43,11 @@ impl Control {
     pub fn reporting_to(mut self, listener: impl Fn(Progress) + Send + Sync + 'static) -> Self {
         self.listener = Some(Arc::new(listener));
         self
+    }
+
+    /// What says whether the stage is to end.
+    pub(crate) fn stop_check(&self) -> Option<Arc<StopCheck>> {
+        self.stop.clone()
     }
 
     /// Whether the stage is to end.

@@ -12,12 +12,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::IdentifyError;
-use super::open_log::OpenLog;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::math::rank;
 use cft_ident_core::math::rfactor::RFactor;
 use cft_ident_core::motion::{self, FilterSettings};
 use cft_ident_core::robot::Robot;
+use cft_ident_logs::recording::RowBlocks;
 
 /// Half of the torques: the least that a dead channel leaves.
 const DEAD_CHANNEL_SHARE: f64 = 0.5;
@@ -34,10 +34,9 @@ struct JointRows {
 
 /// Whether the joints move, where their torques are `off` (joint, from, to \[s\]), as they do without.
 pub(crate) fn moves_freely(
-    robot: &Robot,
-    settings: &FilterSettings,
+    (robot, settings): (&Robot, &FilterSettings),
     name: &str,
-    open: &mut OpenLog<'_>,
+    blocks: &mut RowBlocks,
     off: &[(usize, [f64; 2])],
 ) -> Result<bool, IdentifyError> {
     let n = robot.joints();
@@ -59,7 +58,7 @@ pub(crate) fn moves_freely(
     let mut row = vec![0.0; unknowns + 1];
     let near = END_PERIODS / settings.cutoff_hz;
     let run = motion::run(
-        &mut |block| open.read(block),
+        &mut |block| blocks.read(block),
         n,
         settings,
         None,

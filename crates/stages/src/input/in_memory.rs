@@ -7,6 +7,7 @@ use super::robot_setup::RobotSetup;
 use crate::note::StageNote;
 use cft_ident_core::motion::{FilterSettings, Stretch, Summary, stretches};
 use cft_ident_logs::log::{Instant, Provenance};
+use cft_ident_logs::recording::RowBlocks;
 
 /// Most samples that are taken into memory, over all logs: 2 GB for a robot of seven joints.
 const MOST_SAMPLES: usize = 9_000_000;
@@ -37,6 +38,13 @@ pub fn read_whole(
     read_each(setup, &vec![setup.settings(); logs.len()], logs, control)
 }
 
+/// Counts stretches from where the machine began to run, as far as that is known: a part of a log begins later.
+pub(crate) fn count_run_time(stretches: &mut [Stretch], blocks: &RowBlocks) {
+    for stretch in stretches {
+        stretch.began += blocks.reader().started_s();
+    }
+}
+
 /// The same as [`read_whole`], each log with the settings in its place.
 pub(crate) fn read_each(
     setup: &RobotSetup,
@@ -53,14 +61,15 @@ pub(crate) fn read_each(
     let mut averaged = false;
     for (index, (log, settings)) in logs.iter().zip(settings).enumerate() {
         let name = log.name();
-        let mut open = log.open(control)?;
-        origin = origin.or_else(|| Some(open.origin()));
-        averaged |= open.is_centred();
-        let (mut found, summary) = stretches(index, n, settings, &mut |block| open.read(block))
+        let mut blocks = log.blocks(control)?;
+        let zero = log.recording().origin();
+        origin = origin.or(Some(zero));
+        averaged |= log.recording().is_held();
+        let (mut found, summary) = stretches(index, n, settings, &mut |block| blocks.read(block))
             .map_err(|e| IdentifyError::of_run(&name, e))?;
-        open.count_run_time(&mut found);
+        count_run_time(&mut found, &blocks);
         for stretch in &mut found {
-            stretch.zero = open.origin().seconds();
+            stretch.zero = zero.seconds();
         }
         samples += found.iter().map(Stretch::len).sum::<usize>();
         if samples > MOST_SAMPLES {
@@ -70,9 +79,9 @@ pub(crate) fn read_each(
                 most: MOST_SAMPLES,
             });
         }
-        notes.extend(open.notes_with(&summary));
+        notes.extend(log.notes_with(&blocks, &summary));
         notes.extend(setup.put_temperatures(log, &mut found)?);
-        inputs.push(open.provenance()?);
+        inputs.push(blocks.provenance()?);
         all.extend(found);
         last = Some(summary);
         work.advance(1);

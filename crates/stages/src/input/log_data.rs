@@ -6,11 +6,10 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::free_swing::moves_freely;
 use super::log::{Log, arrays_layout, without_rows};
-use super::open_log::OpenLog;
 use super::reference::LoggedReference;
 use super::robot_setup::RobotSetup;
 use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
-use cft_ident_logs::recording::{Recording, RecordingRequest, TorqueCourse};
+use cft_ident_logs::recording::{Recording, RecordingRequest, RowBlocks, TorqueCourse};
 
 /// A log that was read.
 #[derive(Debug, Clone)]
@@ -162,35 +161,22 @@ impl LogData {
         }
     }
 
-    /// Goes along its rows, every torque at the time and pose of its row.
+    /// Its rows, every torque at the time and pose of its row.
     ///
     /// # Errors
     /// A log that fits refuse.
-    pub fn open<'a>(&self, control: &'a Control) -> Result<OpenLog<'a>, IdentifyError> {
-        let recording = self.usable()?;
-        let blocks = recording.blocks()?;
-        Ok(OpenLog::new(&self.name(), recording, blocks, control))
+    pub fn blocks(&self, control: &Control) -> Result<RowBlocks, IdentifyError> {
+        Ok((self.usable()?.blocks()?).stopped_by(control.stop_check()))
     }
 
-    /// Goes along its rows, torques as logged, and says whether each holds until the next row.
-    pub(crate) fn open_raw<'a>(
-        &self,
-        control: &'a Control,
-    ) -> Result<(OpenLog<'a>, bool), IdentifyError> {
-        let recording = self.usable()?;
-        let blocks = recording.held_blocks()?;
-        let open = OpenLog::new(&self.name(), recording, blocks, control);
-        Ok((open, recording.is_held()))
+    /// Its rows, torques as logged: each may hold until the next row.
+    pub(crate) fn held_blocks(&self, control: &Control) -> Result<RowBlocks, IdentifyError> {
+        Ok((self.usable()?.held_blocks()?).stopped_by(control.stop_check()))
     }
 
-    /// Goes along its rows as they were logged, in SI units: motors' channels stay what they are.
-    pub(crate) fn open_channels<'a>(
-        &self,
-        control: &'a Control,
-    ) -> Result<OpenLog<'a>, IdentifyError> {
-        let recording = self.usable()?;
-        let blocks = recording.logged_blocks()?;
-        Ok(OpenLog::new(&self.name(), recording, blocks, control))
+    /// Its rows as they were logged, in SI units: motors' channels stay what they are.
+    pub(crate) fn logged_blocks(&self, control: &Control) -> Result<RowBlocks, IdentifyError> {
+        Ok((self.usable()?.logged_blocks()?).stopped_by(control.stop_check()))
     }
 
     /// The positions that the controller was asked for, where they are known.
@@ -263,14 +249,18 @@ fn swings_freely(
     off: &[(usize, [f64; 2])],
     control: &Control,
 ) -> Result<bool, IdentifyError> {
-    let name = log.name();
-    let mut open = OpenLog::new(&name, &Arc::new(read.clone()), read.blocks()?, control);
+    let mut blocks = read.blocks()?.stopped_by(control.stop_check());
     // Behind coupled gears the motors' channels are not the joints'.
     let n = setup.robot.joints();
     let all = |(_, span): &(usize, [f64; 2])| (0..n).map(|j| (j, *span)).collect();
-    let off = match open.layout().conversion.is_none() {
+    let off = match blocks.reader().layout().conversion.is_none() {
         true => off.to_vec(),
         false => off.iter().flat_map::<Vec<_>, _>(all).collect(),
     };
-    moves_freely(&setup.robot, &setup.settings(), &name, &mut open, &off)
+    moves_freely(
+        (&setup.robot, &setup.settings()),
+        &log.name(),
+        &mut blocks,
+        &off,
+    )
 }

@@ -317,9 +317,9 @@ impl<'a> LsqRows<'a> {
     ) -> Result<Option<BlockFactors>, IdentifyError> {
         let settings = self.settings_of(log, reading);
         let mut noise = self.noise_of(log, reading);
-        let mut open = data.open(self.control)?;
+        let mut blocks = data.blocks(self.control)?;
         let mut read = |block: &mut Block| {
-            let more = open.read(block)?;
+            let more = blocks.read(block)?;
             if let Some(noise) = &mut noise {
                 noise.add(block);
             }
@@ -328,15 +328,15 @@ impl<'a> LsqRows<'a> {
         let robot = &self.setup.robot;
         if let (PositionReading::Again(grid), true) = (reading, self.knows_encoders()) {
             let sums = accumulate_shifted(robot, columns, weigher, &settings, grid, &mut read);
-            let sums = sums.map_err(|e| open.ended(e))?;
+            let sums = sums.map_err(|e| data.to_stage_error(&blocks, e))?;
             return Ok(sums.map(|sums| sums.in_one_block()));
         }
         let folded = accumulate_weighted(robot, columns, weigher, &settings, &mut read);
-        let (mut sums, summary) = folded.map_err(|e| open.ended(e))?;
+        let (mut sums, summary) = folded.map_err(|e| data.to_stage_error(&blocks, e))?;
         if self.logs[log].seen.is_none() {
             self.logs[log].seen = Some(SeenLog {
-                provenance: open.provenance()?,
-                notes: open.notes_with(&summary),
+                provenance: blocks.provenance()?,
+                notes: data.notes_with(&blocks, &summary),
                 // what cannot be fitted is reported by the fit itself
                 jumps: jumps(&mut sums).unwrap_or_default(),
                 summary,

@@ -54,10 +54,10 @@ pub fn read(
     log: &LogData,
     control: &Control,
 ) -> Result<OneJointLog, IdentifyError> {
-    let (mut open, zero_order_hold) = log.open_raw(control)?;
+    let mut blocks = log.held_blocks(control)?;
     let mut whole = Block::default();
     let mut block = Block::default();
-    while open.read(&mut block)? {
+    while blocks.read(&mut block)? {
         whole.t.extend_from_slice(&block.t);
         if whole.t.len() > MOST_ROWS {
             return Err(IdentifyError::TooManyRows {
@@ -82,8 +82,8 @@ pub fn read(
     Ok(OneJointLog {
         motions: smooth(&declared)?,
         narrower: smooth(&narrower)?,
-        zero_order_hold,
-        notes: open.notes(),
-        provenance: open.provenance()?,
+        zero_order_hold: log.recording().is_held(),
+        notes: log.notes(&blocks),
+        provenance: blocks.provenance()?,
     })
 }

@@ -311,10 +311,10 @@ impl RobotSetup {
         let most = (MOST_ROWS / logs.len().max(1)).max(LEAST_ROWS);
         let mut all: Vec<Stretch> = Vec::new();
         for (index, log) in logs.iter().enumerate() {
-            let mut open = log.open(control)?;
+            let mut blocks = log.blocks(control)?;
             let mut rows = 0;
             let mut read = |block: &mut Block| {
-                let more = open.read(block)?;
+                let more = blocks.read(block)?;
                 rows += block.len();
                 Ok(more && rows < most)
             };
