@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::error::ExportError;
 use super::source_link::SourceLink;
 
 /// A file of the user's that a model is written into.
@@ -14,6 +15,29 @@ pub struct SourceText<'a> {
     pub names: &'a BTreeMap<String, String>,
     /// Its folder as seen from that of the output, where that is another one.
     pub folder: Option<&'a str>,
+}
+
+impl SourceText<'_> {
+    /// Refuses the file for what is wrong with it.
+    pub(super) fn refused(&self, problem: String, remedy: impl Into<String>) -> ExportError {
+        ExportError::OtherSource {
+            file: self.file.to_owned(),
+            problem,
+            remedy: remedy.into(),
+        }
+    }
+
+    /// What a joint of the model is called among the joints that are there.
+    pub(super) fn called<'n>(
+        &self,
+        joint: &str,
+        mut there: impl Iterator<Item = &'n str>,
+    ) -> String {
+        match self.names.get(joint) {
+            Some(name) if !there.any(|other| other == joint) => name.clone(),
+            _ => joint.to_owned(),
+        }
+    }
 }
 
 /// A model in a file of the user's.

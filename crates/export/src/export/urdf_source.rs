@@ -97,20 +97,10 @@ pub fn tip_of(arm: &Arm, written: &str) -> Option<Option<String>> {
 }
 
 impl UrdfWriting<'_> {
-    fn refused(&self, problem: String, remedy: &str) -> ExportError {
-        ExportError::OtherSource {
-            file: self.source.file.to_owned(),
-            problem,
-            remedy: remedy.to_owned(),
-        }
-    }
-
     /// What a joint of the model is called there.
     fn called(&self, joint: &str) -> String {
-        match self.source.names.get(joint) {
-            Some(name) if !self.joints.iter().any(|other| other == joint) => name.clone(),
-            _ => joint.to_owned(),
-        }
+        let there = self.joints.iter().map(String::as_str);
+        self.source.called(joint, there)
     }
 
     fn moved_by(&self, name: &str) -> Option<usize> {
@@ -129,13 +119,17 @@ impl UrdfWriting<'_> {
                 let has = self.joints.join(", ");
                 let remedy = "give the URDF of this robot, or name its joints by `name` in [log.joint] of the robot file";
                 index.ok_or_else(|| {
-                    self.refused(format!("has no joint `{called}`; it has {has}"), remedy)
+                    self.source
+                        .refused(format!("has no joint `{called}`; it has {has}"), remedy)
                 })?
             }
             _ => {
                 let index = self.links.iter().position(|l| l.name == link.name);
                 let problem = || format!("has no link `{}`, which follows a joint", link.name);
-                index.ok_or_else(|| self.refused(problem(), "give the URDF of this robot"))?
+                index.ok_or_else(|| {
+                    self.source
+                        .refused(problem(), "give the URDF of this robot")
+                })?
             }
         };
         let (parent, pose) = self.carried_by(self.links, index);
@@ -155,7 +149,7 @@ impl UrdfWriting<'_> {
             joint,
         };
         if let Some(differs) = difference(link, &there) {
-            return Err(self.refused(
+            return Err(self.source.refused(
                 format!("link `{}` is not where the model has `{}`: {differs}", there.name, link.name),
                 "identify with a robot file of this URDF (`cft-ident new NAME --urdf FILE`), so that frames are one",
             ));

@@ -45,19 +45,14 @@ pub fn written(
 ) -> Result<WrittenSource, ExportError> {
     // comments become as many spaces, so that places are those of the text
     let plain = without_comments(source.text);
-    let refused = |problem: String, remedy: &str| ExportError::OtherSource {
-        file: source.file.to_owned(),
-        problem,
-        remedy: remedy.to_owned(),
-    };
     let tree = XmlTree::parse(&plain).map_err(|wrong| {
         let text = format!("line {}: {}", wrong.line, wrong.problem.what);
-        refused(text, &wrong.problem.remedies.join("; "))
+        source.refused(text, wrong.problem.remedies.join("; "))
     })?;
     let root = tree.root();
     if root.name() != "mujoco" {
         let problem = format!("is no MJCF: its root is <{}>", root.name());
-        return Err(refused(problem, "give the file whose root is <mujoco>"));
+        return Err(source.refused(problem, "give the file whose root is <mujoco>"));
     }
     let mut writing = SourceWriting {
         arm,
@@ -70,7 +65,7 @@ pub fn written(
         notes: Vec::new(),
     };
     if let Some(wrong) = writing.layout.wrong.first() {
-        return Err(refused(wrong.clone(), "correct it"));
+        return Err(source.refused(wrong.clone(), "correct it"));
     }
     for link in &arm.links {
         writing.find(link)?;
@@ -104,22 +99,10 @@ pub fn written(
 }
 
 impl<'p, 't> SourceWriting<'_, 't, 'p> {
-    fn refused(&self, problem: String, remedy: impl Into<String>) -> ExportError {
-        ExportError::OtherSource {
-            file: self.source.file.to_owned(),
-            problem,
-            remedy: remedy.into(),
-        }
-    }
-
     /// What a joint of the model is called there.
     fn called(&self, joint: &str) -> String {
         let there = self.layout.bodies.iter().flat_map(|body| &body.joints);
-        let mut there = there.map(|joint| joint.name);
-        match self.source.names.get(joint) {
-            Some(name) if !there.any(|other| other == joint) => name.clone(),
-            _ => joint.to_owned(),
-        }
+        self.source.called(joint, there.map(|joint| joint.name))
     }
 
     /// Finds the body of the next link of the model, which must stand where the model has it.
@@ -128,7 +111,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
             ArmJoint::Own(joint) => Some(self.moved_by(&self.called(&joint.name))?),
             ArmJoint::Fixed => Some(self.named(&link.name).ok_or_else(|| {
                 let problem = format!("has no body `{}`", link.name);
-                self.refused(problem, "give the MJCF of this robot")
+                self.source.refused(problem, "give the MJCF of this robot")
             })?),
             ArmJoint::Mimic {
                 of, factor, offset, ..
@@ -142,7 +125,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
         if let Some(there) = &there {
             if let Some(differs) = difference(link, there) {
                 let between = self.between(index);
-                return Err(self.refused(
+                return Err(self.source.refused(
                     format!(
                         "body `{}` is not where the model has `{}`: {differs}{between}",
                         there.name, link.name
@@ -174,7 +157,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
             let unread = unread.map_or(String::new(), |(name, line)| {
                 format!("; <{name}> of line {line} is not read")
             });
-            return Err(self.refused(
+            return Err(self.source.refused(
                 format!("has no joint `{name}`; it has {}{unread}", all.join(", ")),
                 "give the MJCF of this robot, or name its joints by `name` in [log.joint] of the robot file",
             ));
@@ -193,7 +176,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
                     "body `{}` is moved by `{name}` and `{}`",
                     body.name, other.name
                 );
-                return Err(self.refused(
+                return Err(self.source.refused(
                     text,
                     "give each of them a body of its own, as the model has it",
                 ));
@@ -203,7 +186,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
         let joint = joint.filter(|joint| !matches!(joint.kind, "hinge" | "slide"));
         if let Some(joint) = joint {
             let text = format!("joint `{name}` is of the type {}", joint.kind);
-            return Err(self.refused(
+            return Err(self.source.refused(
                 text,
                 "the model's turns or slides: give the MJCF of this robot",
             ));
@@ -340,7 +323,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
                 .collect();
             let there = [index].into_iter().chain(hung.iter().copied());
             if let Some((name, line)) = there.filter_map(|k| self.layout.bodies[k].unread).next() {
-                return Err(self.refused(
+                return Err(self.source.refused(
                     format!("what <{name}> of line {line} hangs on link `{}` is not read", link.name),
                     "let MuJoCo write it out: mujoco.mj_saveLastXML(\"flat.xml\", mujoco.MjModel.from_xml_path(FILE)), and give that",
                 ));
