@@ -3,7 +3,6 @@
 pub(crate) mod compare;
 pub(crate) mod hold_out;
 pub(crate) mod open_loop;
-pub(crate) mod reduced_logs;
 pub(crate) mod residual;
 pub(crate) mod torque;
 pub(crate) mod validate;

@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::open_loop::{free_run, open_loop};
-use super::reduced_logs::check_smoothed_alike;
 use crate::band::{Band, Reach};
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
@@ -13,6 +12,7 @@ use crate::input::in_memory::read_whole;
 use crate::input::model::refined;
 use crate::input::of_robot::{JointRanges, TorquePeaks};
 use crate::input::position_cutoff::known;
+use crate::input::reduced::check_smoothed_alike;
 use crate::input::repeated::{fitted_identities, repeated_rows, used_for};
 use crate::note::{ModelNote, StageNote};
 use crate::open_loop::{FreeRun, OpenLoop};

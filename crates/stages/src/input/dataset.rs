@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::log::{Log, without_rows};
+use super::log::Log;
 use super::log_data::{LogData, raise};
 use super::model::refined;
 use super::reduced::reduced_log::ReducedLog;
@@ -128,7 +128,7 @@ impl Dataset {
     /// The first reduced log.
     pub(crate) fn check_rows(&self) -> Result<(), IdentifyError> {
         match self.reduced.first() {
-            Some(part) => Err(without_rows(part).into()),
+            Some(part) => Err(part.without_rows().into()),
             None => Ok(()),
         }
     }

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::control::Control;
 use super::reduced::reduced_log::ReducedLog;
-use cft_ident_logs::log::{Layout, LogArrays, LogError, LogSpec, Reader, escape};
+use cft_ident_logs::log::{Layout, LogArrays, LogError, LogSpec, Reader};
 
 /// Where a log is.
 #[derive(Debug, Clone)]
@@ -101,7 +101,7 @@ impl Log {
     ) -> Result<Reader, LogError> {
         match self {
             Self::File(spec) => Reader::open_until(spec, layout, &|| control.stopped()),
-            Self::Reduced(part) => Err(without_rows(part)),
+            Self::Reduced(part) => Err(part.without_rows()),
             Self::Arrays(arrays) => Reader::of_arrays(arrays, arrays_layout(layout, joints)),
         }
     }
@@ -113,15 +113,6 @@ pub(crate) fn arrays_layout(layout: &Layout, joints: &[String]) -> Layout {
     match layout.torques.is_empty() {
         true => plain.without_torques(),
         false => plain,
-    }
-}
-
-/// Why a reduced log cannot be read.
-pub(crate) fn without_rows(part: &ReducedLog) -> LogError {
-    LogError::Format {
-        file: escape(part.name()),
-        kind: "a reduced log",
-        remedy: "its rows are not there any more: give the log itself",
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::control::Control;
 use super::error::IdentifyError;
 use super::free_swing::moves_freely;
-use super::log::{Log, arrays_layout, without_rows};
+use super::log::{Log, arrays_layout};
 use super::reference::LoggedReference;
 use super::robot_setup::RobotSetup;
 use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
@@ -100,7 +100,7 @@ impl LogData {
         let read = match log {
             Log::File(spec) => Recording::read(spec, &request),
             Log::Arrays(arrays) => Recording::of_arrays(arrays, &request),
-            Log::Reduced(part) => Err(without_rows(part)),
+            Log::Reduced(part) => Err(part.without_rows()),
         };
         let read = read?;
         let (duration_s, cutoff_hz) = (read.duration_s(), setup.settings().cutoff_hz);

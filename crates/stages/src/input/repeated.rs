@@ -4,7 +4,6 @@ use super::dataset::Dataset;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::log_data::LogData;
-use super::reduced::reduced_log::ReducedLog;
 use crate::note::{LogNote, StageNote};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{DataRole, Layout, LogSpec, Provenance, escape, shares_rows};
@@ -29,16 +28,6 @@ impl RowIdentity {
         }
     }
 
-    fn of_reduced(part: &ReducedLog) -> Self {
-        let span = part.provenance.span.iter();
-        let span: String = span.map(|span| format!("@{span}")).collect();
-        RowIdentity {
-            shown: escape(part.name()) + &span,
-            sha256: Some(part.provenance.sha256.clone()),
-            bounds_s: part.bounds_s,
-        }
-    }
-
     fn shares_rows(&self, other: &Self) -> bool {
         let [a, b] = [self.bounds_s, other.bounds_s];
         let overlap = a[0] <= b[1] && b[0] <= a[1];
@@ -53,10 +42,15 @@ pub(crate) fn identities(logs: &[LogData]) -> Vec<RowIdentity> {
 
 /// The same of the logs of a dataset that are fitted, reduced ones among them.
 pub(crate) fn fitted_identities(data: &Dataset) -> Vec<RowIdentity> {
-    let reduced = data
-        .reduced
-        .iter()
-        .map(|part| RowIdentity::of_reduced(part));
+    let reduced = data.reduced.iter().map(|part| {
+        let span = part.provenance.span.iter();
+        let span: String = span.map(|span| format!("@{span}")).collect();
+        RowIdentity {
+            shown: escape(part.name()) + &span,
+            sha256: Some(part.provenance.sha256.clone()),
+            bounds_s: part.bounds_s,
+        }
+    });
     reduced.chain(identities(&data.logs)).collect()
 }
 

@@ -16,7 +16,7 @@ use cft_ident_core::inertia::late;
 use cft_ident_core::motion::Summary;
 use cft_ident_core::robot::friction::DoubleTanh;
 use cft_ident_files::config::RobotFile;
-use cft_ident_logs::log::Provenance;
+use cft_ident_logs::log::{LogError, Provenance, escape};
 
 /// What reduced logs were made with: those of one fit agree in all of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -180,6 +180,15 @@ impl ReducedLog {
     /// Name of the log.
     pub fn name(&self) -> &str {
         &self.provenance.name
+    }
+
+    /// Refuses to read its rows.
+    pub(crate) fn without_rows(&self) -> LogError {
+        LogError::Format {
+            file: escape(self.name()),
+            kind: "a reduced log",
+            remedy: "its rows are not there any more: give the log itself",
+        }
     }
 
     /// Refuses it for `what`, which needs its rows.

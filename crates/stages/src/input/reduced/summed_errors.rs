@@ -1,8 +1,8 @@
 //! The errors that a model leaves of reduced logs, by their sums.
 
+use super::error::ReducedError;
+use super::reduced_log::ReducedLog;
 use crate::input::dataset::Dataset;
-use crate::input::reduced::error::ReducedError;
-use crate::input::reduced::reduced_log::ReducedLog;
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::columns;
 use cft_ident_core::effect::AugmentedModel;
