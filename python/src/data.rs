@@ -1,10 +1,12 @@
 //! Robots, logs, models and reduced logs as Python holds them.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use cft_ident::config::{ModelFile, RobotFile};
-use cft_ident::identify::{self, GivenModel, ReducedLogs, RobotSetup, is_reduced};
+use cft_ident::identify::{
+    self, Control, Dataset, GivenModel, LogData, ReducedLogs, RobotSetup, is_reduced,
+};
 use cft_ident::log::{LogSpec, Provenance};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -13,10 +15,10 @@ use pyo3::types::PyBytes;
 use crate::errors::{UsageError, of_input, of_stage};
 use crate::numbers::ModelNumbers;
 
-/// A robot file.
 /// Name, joint, value, standard deviation, value in use and unit of a parameter.
 type ParameterRow = (String, Option<String>, f64, Option<f64>, f64, String);
 
+/// A robot file.
 #[pyclass(frozen, module = "cft_ident._native")]
 pub struct Robot {
     pub machine: RobotSetup,
@@ -63,6 +65,72 @@ impl Robot {
 pub struct Log {
     pub logs: Vec<identify::Log>,
     pub spec: Option<LogSpec>,
+    /// What the last call read of a file, which the next one does not parse again.
+    recording: Arc<Mutex<Option<LogData>>>,
+}
+
+impl Log {
+    fn new(logs: Vec<identify::Log>, spec: Option<LogSpec>) -> Self {
+        Log {
+            logs,
+            spec,
+            recording: Arc::default(),
+        }
+    }
+}
+
+/// The logs of one call.
+pub struct GivenLogs {
+    pub logs: Vec<identify::Log>,
+    /// What calls before it read of the files among them.
+    recordings: Vec<Arc<Mutex<Option<LogData>>>>,
+}
+
+impl GivenLogs {
+    pub fn new(given: &[PyRef<'_, Log>]) -> Self {
+        let files = given.iter().filter(|log| log.spec.is_some());
+        GivenLogs {
+            logs: given.iter().flat_map(|log| log.logs.clone()).collect(),
+            recordings: files.map(|log| Arc::clone(&log.recording)).collect(),
+        }
+    }
+
+    pub fn names(&self) -> Vec<String> {
+        self.logs.iter().map(identify::Log::name).collect()
+    }
+
+    /// Reads them by a robot file.
+    pub fn read(&self, setup: &RobotSetup, control: &Control) -> PyResult<Dataset> {
+        let data = Dataset::read_beside(setup, &self.logs, &self.kept(), control);
+        let data = data.map_err(of_stage)?;
+        self.keep(&data.logs);
+        Ok(data)
+    }
+
+    /// Adds them to a dataset as logs that are held out.
+    pub fn held_out_of(&self, data: Dataset, control: &Control) -> PyResult<Dataset> {
+        let beside = [data.logs.as_slice(), &self.kept()];
+        let held_out = LogData::read_all(&data.setup, &self.logs, &beside, control);
+        let held_out = held_out.map_err(of_stage)?;
+        self.keep(&held_out);
+        Ok(data.with_held_out(&held_out))
+    }
+
+    fn kept(&self) -> Vec<LogData> {
+        let kept = self.recordings.iter();
+        kept.filter_map(|kept| kept.lock().ok()?.clone()).collect()
+    }
+
+    fn keep(&self, read: &[LogData]) {
+        let files = read
+            .iter()
+            .filter(|log| matches!(log.source, identify::Log::File(_)));
+        for (kept, log) in self.recordings.iter().zip(files) {
+            if let Ok(mut kept) = kept.lock() {
+                *kept = Some(log.clone());
+            }
+        }
+    }
 }
 
 #[pymethods]
@@ -73,15 +141,9 @@ impl Log {
         let spec: LogSpec = path.parse().map_err(of_input)?;
         if is_reduced(&spec.path) {
             let parts = ReducedLogs::load(&spec.path).map_err(of_stage)?;
-            return Ok(Log {
-                logs: parts.as_logs(),
-                spec: None,
-            });
+            return Ok(Log::new(parts.as_logs(), None));
         }
-        Ok(Log {
-            logs: vec![identify::Log::from(&spec)],
-            spec: Some(spec),
-        })
+        Ok(Log::new(vec![identify::Log::from(&spec)], Some(spec)))
     }
 
     /// Arrays: times `[s]`, positions and torques with one row per sample and one column per joint, in SI units;
@@ -122,10 +184,7 @@ impl Log {
             }
             None => log,
         };
-        Ok(Log {
-            logs: vec![log],
-            spec: None,
-        })
+        Ok(Log::new(vec![log], None))
     }
 
     #[getter]
@@ -277,9 +336,6 @@ impl Part {
 
     /// The same as a log for `lsq` and `validate`.
     fn as_log(&self) -> Log {
-        Log {
-            logs: self.logs.as_logs(),
-            spec: None,
-        }
+        Log::new(self.logs.as_logs(), None)
     }
 }

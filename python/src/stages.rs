@@ -9,7 +9,7 @@ use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
     self, AcceptedSetup, Control, Dataset, DiagnoseEnd, DiagnoseSettings, FrictionSettings,
     IdentifyError, LsqSettings, ReducedLogs, RobotSetup, RobotSources, SetupRefusal, TrackSource,
-    ValidateSettings, accepted_setup,
+    ValidateSettings, accepted_setup, check_setup_where_possible,
 };
 use cft_ident::number;
 use cft_ident::report::json::{JsonDocument, NO_WARNINGS};
@@ -18,7 +18,7 @@ use cft_ident::setup::{ChannelKind, Finding, FindingKind, Setting};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
-use crate::data::{Log, Model, Part, Robot};
+use crate::data::{GivenLogs, Log, Model, Part, Robot};
 use crate::errors::{InputError, UsageError, of_command, of_input, of_stage};
 use crate::work;
 
@@ -29,10 +29,6 @@ type FleetRobot<'py> = (String, Vec<PyRef<'py, Part>>, Vec<PyRef<'py, Model>>);
 
 fn shown(document: &JsonDocument, report: &Report) -> Shown {
     (document.text(), report.html(), report.text())
-}
-
-fn all(logs: &[PyRef<'_, Log>]) -> Vec<identify::Log> {
-    logs.iter().flat_map(|log| log.logs.clone()).collect()
 }
 
 /// What a fit goes on with; refuses a set-up that the torques plainly contradict, as the commands do.
@@ -126,25 +122,21 @@ pub fn friction(
     model: Option<PyRef<'_, Model>>,
     as_declared: bool,
 ) -> PyResult<(Shown, Model)> {
-    let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
+    let (machine, logs) = (machine_of(&robot, as_declared), GivenLogs::new(&logs));
     let old = model.map(|m| m.given.file.clone());
     work::run(py, move |control, _| {
-        let setup = accepted(
-            Dataset::read(&machine, &logs, control).map_err(of_stage)?,
-            control,
-        )?;
+        let setup = accepted(logs.read(&machine, control)?, control)?;
         let machine = &setup.data.setup;
         let settings = FrictionSettings { joint };
         let fitted = setup.friction(&settings, old.as_ref(), control);
         let (found, model) = fitted.map_err(of_stage)?;
         let document = JsonDocument::new("friction", &found.inputs, &found.notes, &found);
-        let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::friction::friction(&stages::friction::Friction {
             setup: machine,
             found: &found,
             file: &model,
             path: "friction.toml",
-            logs: &names,
+            logs: &logs.names(),
         });
         let shown = shown(&document.map_err(of_input)?, &report);
         Ok((shown, Model::of("friction.toml", model)?))
@@ -182,7 +174,7 @@ pub fn lsq(
     hold_friction: bool,
     as_declared: bool,
 ) -> PyResult<(Shown, Model)> {
-    let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
+    let (machine, logs) = (machine_of(&robot, as_declared), GivenLogs::new(&logs));
     let kind = self::estimator(estimator)?;
     let friction = model.map(|m| m.given.clone());
     if friction.is_none() && machine.file.needs_friction_first() {
@@ -197,10 +189,7 @@ pub fn lsq(
                 .belongs_to(&given.name, &machine.file)
                 .map_err(of_input)?;
         }
-        let setup = accepted(
-            Dataset::read(&machine, &logs, control).map_err(of_stage)?,
-            control,
-        )?;
+        let setup = accepted(logs.read(&machine, control)?, control)?;
         let machine = &setup.data.setup;
         let settings = LsqSettings {
             estimator: kind,
@@ -211,13 +200,12 @@ pub fn lsq(
         };
         let (found, model) = setup.lsq(&settings, control).map_err(of_stage)?;
         let document = JsonDocument::new("lsq", &found.inputs, &found.notes, &found);
-        let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::lsq::lsq(&stages::lsq::LsqReport {
             setup: machine,
             found: &found,
             file: &model,
             path: "model.toml",
-            logs: &names,
+            logs: &logs.names(),
             typed: "LOG",
         });
         let shown = shown(&document.map_err(of_input)?, &report);
@@ -233,10 +221,10 @@ pub fn validate(
     logs: Vec<PyRef<'_, Log>>,
 ) -> PyResult<Shown> {
     let (given, provenance) = (model.given.clone(), model.provenance());
-    let logs = all(&logs);
+    let logs = GivenLogs::new(&logs);
     work::run(py, move |control, _| {
         let augmented = given.numbers().map_err(of_stage)?;
-        let data = Dataset::read(&given.setup(), &logs, control).map_err(of_stage)?;
+        let data = logs.read(&given.setup(), control)?;
         let settings = ValidateSettings {
             free_run: true,
             ..ValidateSettings::of(&given)
@@ -244,12 +232,11 @@ pub fn validate(
         let found = identify::validate(&data, &settings, control, &mut |_, _| {});
         let found = found.map_err(of_stage)?;
         let document = JsonDocument::new("validate", &found.inputs, &found.notes, &found);
-        let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::validate::validate(&stages::validate::ValidateReport {
             setup: &data.setup,
             file: &given.file,
             model: &augmented,
-            logs: &names,
+            logs: &logs.names(),
             found: &found,
             limit: None,
             given: &provenance,
@@ -278,11 +265,11 @@ pub fn rows<'py>(
     model: PyRef<'py, Model>,
     logs: Vec<PyRef<'py, Log>>,
 ) -> PyResult<RowArrays<'py>> {
-    let (given, logs) = (model.given.clone(), all(&logs));
+    let (given, logs) = (model.given.clone(), GivenLogs::new(&logs));
     let n = given.file.robot.joint_names().len();
     let (t, [q, v, measured, reconstructed, half_width], moving) =
         work::run(py, move |control, _| {
-            let data = Dataset::read(&given.setup(), &logs, control).map_err(of_stage)?;
+            let data = logs.read(&given.setup(), control)?;
             let (mut t, mut moving, mut columns) =
                 (Vec::new(), Vec::new(), [const { Vec::new() }; 5]);
             let settings = ValidateSettings::of(&given);
@@ -326,11 +313,13 @@ pub fn diagnose(
     keep: bool,
 ) -> PyResult<(Shown, Option<Model>)> {
     let (of, given) = (model.given.clone(), model.provenance());
-    let (train, holdout) = (all(&logs), all(&holdout));
+    let (train, holdout) = (GivenLogs::new(&logs), GivenLogs::new(&holdout));
     work::run(py, move |control, _| {
         let (machine, file) = (of.setup(), &of.file);
-        let data = Dataset::read(&machine, &train, control).map_err(of_stage)?;
-        let data = data.holding_out(&holdout, control).map_err(of_stage)?;
+        let data = holdout.held_out_of(train.read(&machine, control)?, control)?;
+        let setup = check_setup_where_possible(&data, control)
+            .map_err(of_stage)?
+            .report;
         let settings = DiagnoseSettings {
             keep,
             ..DiagnoseSettings::of(&of)
@@ -338,13 +327,18 @@ pub fn diagnose(
         let end = identify::diagnose(&data, &settings, control).map_err(of_stage)?;
         match end {
             DiagnoseEnd::DataFault(fault) => {
-                let document = JsonDocument::new("diagnose", &[], &NO_WARNINGS, &fault.result());
+                let document = JsonDocument::new(
+                    "diagnose",
+                    &[],
+                    &NO_WARNINGS,
+                    &fault.result().with_setup(setup),
+                );
                 let report = stages::diagnose::data_fault(&fault, &given);
                 Ok((shown(&document.map_err(of_input)?, &report), None))
             }
             DiagnoseEnd::Diagnosed(found) => {
                 let (inputs, notes) = (&found.in_memory.inputs, &found.in_memory.notes);
-                let result = found.result(&machine);
+                let result = found.result(&machine).with_setup(setup);
                 let document = JsonDocument::new("diagnose", inputs, notes, &result);
                 let refined = found.model(&machine, file);
                 let report = stages::diagnose::diagnose(&stages::diagnose::DiagnoseReport {
@@ -373,14 +367,10 @@ pub fn reduce(
     model: Option<PyRef<'_, Model>>,
     as_declared: bool,
 ) -> PyResult<Part> {
-    let (machine, logs) = (machine_of(&robot, as_declared), all(&logs));
+    let (machine, logs) = (machine_of(&robot, as_declared), GivenLogs::new(&logs));
     let friction = model.map(|m| m.given.clone());
     work::run(py, move |control, _| {
-        let data = accepted(
-            Dataset::read(&machine, &logs, control).map_err(of_stage)?,
-            control,
-        )?
-        .data;
+        let data = accepted(logs.read(&machine, control)?, control)?.data;
         let found = identify::reduce(&data, friction.as_ref(), control).map_err(of_stage)?;
         Ok(Part {
             logs: Arc::new(found),

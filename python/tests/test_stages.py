@@ -118,6 +118,19 @@ def test_arguments_in_the_wrong_place_are_refused_by_name(slide, slide_robot):
         ci.validate(log, ci.lsq(slide_robot, log).model)
 
 
+@pytest.mark.parametrize(("log", "robot"), [("emps/emps_id.csv", "configs/emps.toml"), ("ur10/ur10_exciting.csv", "configs/ur10.toml")])
+def test_documents_are_those_of_the_program(measured, tool, log, robot):
+    words = {part: measured(log) + span for part, span in (("fit", "@0..70%"), ("held out", "@70..100%"))}
+    logs = {part: ci.Log.load(path) for part, path in words.items()}
+    fit = ci.lsq(ci.Robot.load(robot), logs["fit"])
+    assert fit.to_dict() == tool("lsq", words["fit"], "-r", robot, "-o", "model.toml")
+    theirs = tool("validate", words["held out"], "-m", "model.toml")
+    # the second call takes the log that the first one read
+    assert all(ci.validate(fit.model, logs["held out"]).to_dict() == theirs for _ in range(2))
+    theirs = tool("diagnose", words["fit"], "-m", "model.toml", "--holdout", words["held out"])
+    assert ci.diagnose(fit.model, logs["fit"], holdout=logs["held out"]).to_dict() == theirs
+
+
 def test_reduced_logs_are_those_of_the_command_line(measured, tool, tmp_path):
     log = measured("ur10/ur10_exciting.csv")
     tool("reduce", log, "-r", "configs/ur10.toml", "-o", "part.cfi")

@@ -10,9 +10,7 @@ use cft_ident_logs::log::LogSpec;
 use cft_ident_report::report::json::{JsonDocument, NO_WARNINGS};
 use cft_ident_report::report::sections::{provenance, quality, residual};
 use cft_ident_report::report::stages;
-use cft_ident_stages::identify::{
-    self, DataFault, Dataset, DiagnoseEnd, DiagnoseSettings, DiagnosisResult, DiagnosisVerdict,
-};
+use cft_ident_stages::identify::{self, DataFault, Dataset, DiagnoseEnd, DiagnoseSettings};
 use cft_ident_stages::replay::ReplayedDiagnosis;
 
 const EXAMPLE: &str = "\
@@ -106,13 +104,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         &context.control,
     )?
     .holding_out(&logs_of(&args.holdout), &context.control)?;
-    let report = setup::report(&data, context)?;
-    let fault = report.refusals().next().map(DataFault::of_setup);
-    if let Some(fault) = fault.as_ref().filter(|_| !args.as_declared) {
-        return Err(at_fault(fault));
+    let setup = setup::report(&data, context)?;
+    if let (Some(finding), false) = (setup.refusals().next(), args.as_declared) {
+        return Err(at_fault(&DataFault::of_setup(finding)));
     }
     let end = identify::diagnose(&data, &settings, &context.control)?;
-    let setup = report.findings;
     let found = match end {
         DiagnoseEnd::Diagnosed(found) => *found,
         DiagnoseEnd::DataFault(fault) if !args.as_declared => return Err(at_fault(&fault)),
@@ -127,25 +123,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 provenance::section(&mut page, robot, &inputs, made_from, None, command);
                 context.write_text(path, &report.html())?;
             }
-            let result = DiagnosisResult {
-                setup,
-                ..fault.result()
-            };
+            let result = fault.result().with_setup(setup);
             let document = JsonDocument::new("diagnose", &[], &NO_WARNINGS, &result)?;
             return Ok(Outcome::new(report.text_for(context.screen), document));
         }
     };
     let (inputs, notes) = (&found.in_memory.inputs, &found.in_memory.notes);
-    let plain = found.result(&machine);
-    let result = DiagnosisResult {
-        setup,
-        verdict: match fault {
-            Some(_) => DiagnosisVerdict::DataFault,
-            None => plain.verdict,
-        },
-        faults: fault.into_iter().collect(),
-        ..plain
-    };
+    let result = found.result(&machine).with_setup(setup);
     let document = JsonDocument::new("diagnose", inputs, notes, &result)?;
     let refined = found.model(&machine, file);
     let written = args.output.as_ref().unwrap_or(&args.model);

@@ -13,7 +13,7 @@ use super::formulas::{
 use super::next_motion::separating_command;
 use crate::input::robot_setup::RobotSetup;
 use crate::open_loop::FreeRun;
-use crate::setup::Finding;
+use crate::setup::{Finding, SetupReport};
 use cft_ident_core::diagnose::{
     AcceptedEffect, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
     SignalDependence, SplitErrors, StepStatus,
@@ -208,6 +208,23 @@ fn by_key<S: Serializer, T: Serialize>(
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     serializer.collect_map(list.iter().map(|(key, value)| (key, value)))
+}
+
+impl DiagnosisResult {
+    /// The same with what the check of the set-up found; a finding for which fits refuse it is a fault of the data.
+    pub fn with_setup(self, report: SetupReport) -> Self {
+        let fault = report.refusals().next().map(DataFault::of_setup);
+        let fault = fault.filter(|_| self.faults.is_empty());
+        Self {
+            verdict: match fault {
+                Some(_) => DiagnosisVerdict::DataFault,
+                None => self.verdict,
+            },
+            faults: self.faults.into_iter().chain(fault).collect(),
+            setup: report.findings,
+            ..self
+        }
+    }
 }
 
 impl DataFault {
