@@ -29,7 +29,7 @@ use cft_ident_export::export::dissipative::below_zero;
 use cft_ident_export::export::left_out::{self, LeftOut, OmissionPlace};
 use cft_ident_export::export::source_text::{SourceText, WrittenSource};
 use cft_ident_export::export::{self, ExportError, Note, Program, mjcf_source, urdf, urdf_source};
-use cft_ident_files::config::{ModelFile, RobotFile};
+use cft_ident_files::config::{ModelFile, WholeUrdf};
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::table::{CellAlignment, Table};
@@ -300,15 +300,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let folder = args.urdf_source.as_deref();
         let folder = folder.and_then(|source| folder_from(path, source));
         let into = |head: &[String]| {
-            let write = |source: &ReadFile<(String, [RobotFile; 2])>| {
-                let (text, robots) = &source.value;
+            let write = |source: &ReadFile<(String, WholeUrdf)>| {
+                let (text, whole) = &source.value;
                 let into = SourceText {
                     file: &source.name,
                     text,
                     names: &names,
                     folder: folder.as_deref(),
                 };
-                urdf_source::written(&arm, &into, robots, head)
+                urdf_source::written(&arm, &into, whole, head)
             };
             source.as_ref().map(write).transpose()
         };

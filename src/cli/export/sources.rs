@@ -8,7 +8,7 @@ use crate::cli::{CliError, file_name};
 use cft_ident_export::export::left_out::LeftOut;
 use cft_ident_export::export::source_text::SourceText;
 use cft_ident_export::export::{self, ExportError};
-use cft_ident_files::config::{self, RobotFile, mjcf_text};
+use cft_ident_files::config::{self, WholeUrdf, mjcf_text};
 use cft_ident_logs::log::{Provenance, escape};
 
 /// A file that a model is written into.
@@ -75,18 +75,14 @@ pub(super) fn with_table<T>(
     found.extend(more);
     Ok((write(&found)?, found))
 }
-/// A URDF that stands for the robot, and the robot that it is read as.
-pub(super) fn source(path: &Path) -> Result<ReadFile<(String, [RobotFile; 2])>, CliError> {
+/// A URDF that a model is written into, and what it says.
+pub(super) fn source(path: &Path) -> Result<ReadFile<(String, WholeUrdf)>, CliError> {
     let shown = escape(&path.to_string_lossy());
     let (file, text) = (file_name(path), config::text(path)?);
-    let section = toml::Value::from(file.as_str());
-    let robot = format!("[robot]\nmodel = \"serial\"\nurdf = {section}\n");
-    let as_written = format!("{robot}angles_as_written = true\n");
-    let read = |robot: &str| RobotFile::parse_in(&shown, robot, path.parent());
-    let robots = [read(&robot)?, read(&as_written)?];
+    let whole = WholeUrdf::parse(&shown, &text)?;
     Ok(ReadFile {
         provenance: Provenance::of_text(&file, &text),
-        value: (text, robots),
+        value: (text, whole),
         name: shown,
     })
 }

@@ -44,3 +44,58 @@ fn no_two_parts_of_an_sdf_have_one_name() {
     assert!(out.contains("<link name=\"j3_link\">"), "{out}");
     assert!(out.contains("<child>j3_link</child>") && out.contains("<joint name=\"j3\""));
 }
+
+#[test]
+fn joints_of_a_usd_whose_names_it_cannot_hold_keep_them_for_display() {
+    let bench = Bench::of(&ARM.replace("\"j3\"", "\"j.3\"").replace("MORE", ""));
+    bench.export("--usd out.usda").success();
+    let out = std::fs::read_to_string(bench.folder.path().join("out.usda")).unwrap();
+    assert!(out.contains("PhysicsRevoluteJoint \"j_3\" ("), "{out}");
+    assert_eq!(out.matches("displayName = \"j.3\"").count(), 1, "{out}");
+    assert_eq!(out.matches("displayName").count(), 2, "{out}");
+}
+
+#[test]
+fn frames_of_an_mjcf_without_mass_have_what_every_reader_takes() {
+    const FRAMES: &str = r#"<body name="plate"><inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/></body><body name="l1""#;
+    const TOOL: &str = r#"<joint name="j3" class="wrist"/><body name="tool" pos="0.3 0 0"/>"#;
+    let bench = Bench::arm();
+    let source = MJCF
+        .replace("<body name=\"l1\"", FRAMES)
+        .replace("<joint name=\"j3\" class=\"wrist\"/>", TOOL);
+    let out = bench.mjcf_from(&source);
+    assert!(!out.contains("mass=\"0\""), "{out}");
+    assert!(
+        out.contains("<body name=\"tool\" pos=\"0.3 0 0\"/>"),
+        "{out}"
+    );
+    // where geoms have no part in it, a body without an inertial is refused by some
+    let told = source.replace(
+        "angle=\"degree\"",
+        "angle=\"degree\" inertiafromgeom=\"false\"",
+    );
+    let out = bench.mjcf_from(&told);
+    assert_eq!(out.matches("mass=\"1e-9\"").count(), 2, "{out}");
+    assert!(
+        out.contains("<body name=\"tool\" pos=\"0.3 0 0\">\n<inertial"),
+        "{out}"
+    );
+}
+
+#[test]
+fn a_urdf_with_more_joints_than_a_model_can_have_takes_one() {
+    use std::fmt::Write;
+    let mut fingers = String::new();
+    for k in 0..40 {
+        let _ = write!(
+            fingers,
+            "<link name=\"f{k}\"/><joint name=\"f{k}_joint\" type=\"revolute\"><parent link=\"l3\"/><child link=\"f{k}\"/>\
+             <axis xyz=\"0 1 0\"/></joint>"
+        );
+    }
+    let bench = Bench::arm();
+    let source = ARM.replace("MORE", &fingers);
+    std::fs::write(bench.folder.path().join("source.urdf"), source).unwrap();
+    let export = bench.export("--urdf out.urdf --urdf-source source.urdf");
+    export.success();
+}

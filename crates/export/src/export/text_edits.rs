@@ -49,10 +49,15 @@ impl<'p> TextEdits<'p> {
         self.pieces.push((at..at, text.to_owned()));
     }
 
-    /// Puts a text behind the begin of an element.
+    /// Puts a text behind the begin of an element, one of a single tag gets an end.
     pub(super) fn put_into(&mut self, of: &Element, text: &str) {
-        let end = tag_end(self.plain, of.range().start);
-        self.pieces.push((end..end, format!("\n{text}")));
+        let start = of.range().start;
+        let end = tag_end(self.plain, start);
+        self.pieces
+            .push(match self.plain[start..end].ends_with("/>") {
+                true => (end - 2..end, format!(">\n{text}\n</{}>", of.name())),
+                false => (end..end, format!("\n{text}")),
+            });
     }
 
     /// Puts a text before the end of an element that has one.

@@ -13,17 +13,13 @@ use super::text_edits::TextEdits;
 use cft_ident_core::robot::standard::Body;
 use cft_ident_core::robot::tree::{Coordinate, Link};
 use cft_ident_files::config::xml::{XmlTree, without_comments};
-use cft_ident_files::config::{RobotFile, UrdfReplacement, replaced_in_urdf};
+use cft_ident_files::config::{UrdfReplacement, WholeUrdf, replaced_in_urdf};
 
 /// The writing of one model into one source.
 struct UrdfWriting<'a> {
     source: &'a SourceText<'a>,
-    /// The whole of the source as a robot.
-    robot: &'a RobotFile,
-    links: &'a [Link],
-    /// The same with their angles as the file writes them, which readers take.
-    as_written: &'a [Link],
-    joints: &'a [String],
+    /// The whole of the source.
+    whole: &'a WholeUrdf,
     /// Link there of each link of the model.
     found: Vec<usize>,
     stand: Vec<SourceLink>,
@@ -31,24 +27,19 @@ struct UrdfWriting<'a> {
     out: UrdfReplacement,
 }
 
-/// The text of a URDF with a model in it, `robots` being the robot that it is, with angles as they are meant and as they
-/// are written; `notes` stand at its head. Joints are matched by name, and each joint's frame must be that of the model.
+/// The text of a URDF with a model in it, `whole` being what it says; `notes` stand at its head. Joints are matched by name, and each joint's frame must be that of the model.
 ///
 /// # Errors
 /// [`ExportError::OtherSource`] for a joint that is not there or sits elsewhere.
 pub fn written(
     arm: &Arm,
     source: &SourceText,
-    [robot, as_written]: &[RobotFile; 2],
+    whole: &WholeUrdf,
     notes: &[String],
 ) -> Result<WrittenSource, ExportError> {
-    let (described, as_written) = (robot.robot(), as_written.robot());
     let mut writing = UrdfWriting {
         source,
-        robot,
-        links: described.tree().links(),
-        as_written: as_written.tree().links(),
-        joints: described.joint_names(),
+        whole,
         found: Vec::new(),
         stand: Vec::new(),
         held: BTreeMap::new(),
@@ -99,15 +90,18 @@ pub fn tip_of(arm: &Arm, written: &str) -> Option<Option<String>> {
 impl UrdfWriting<'_> {
     /// What a joint of the model is called there.
     fn called(&self, joint: &str) -> String {
-        let there = self.joints.iter().map(String::as_str);
+        let there = self.whole.joints.iter().map(String::as_str);
         self.source.called(joint, there)
     }
 
     fn moved_by(&self, name: &str) -> Option<usize> {
-        self.links.iter().position(|link| match &link.coordinate {
-            Coordinate::Joint(j) => self.joints[*j] == name,
-            Coordinate::Follows(_) => false,
-        })
+        self.whole
+            .links
+            .iter()
+            .position(|link| match &link.coordinate {
+                Coordinate::Joint(j) => self.whole.joints[*j] == name,
+                Coordinate::Follows(_) => false,
+            })
     }
 
     /// Finds the next link of the model, which must stand where the model has it.
@@ -116,7 +110,7 @@ impl UrdfWriting<'_> {
             ArmJoint::Own(joint) => {
                 let called = self.called(&joint.name);
                 let index = self.moved_by(&called);
-                let has = self.joints.join(", ");
+                let has = self.whole.joints.join(", ");
                 let remedy = "give the URDF of this robot, or name its joints by `name` in [log.joint] of the robot file";
                 index.ok_or_else(|| {
                     self.source
@@ -124,7 +118,7 @@ impl UrdfWriting<'_> {
                 })?
             }
             _ => {
-                let index = self.links.iter().position(|l| l.name == link.name);
+                let index = self.whole.links.iter().position(|l| l.name == link.name);
                 let problem = || format!("has no link `{}`, which follows a joint", link.name);
                 index.ok_or_else(|| {
                     self.source
@@ -132,10 +126,10 @@ impl UrdfWriting<'_> {
                 })?
             }
         };
-        let (parent, pose) = self.carried_by(self.links, index);
-        let there = &self.links[index];
+        let (parent, pose) = self.carried_by(&self.whole.links, index);
+        let there = &self.whole.links[index];
         let joint = match &there.coordinate {
-            Coordinate::Joint(j) => Some(self.joints[*j].clone()),
+            Coordinate::Joint(j) => Some(self.whole.joints[*j].clone()),
             Coordinate::Follows(_) => None,
         };
         let there = SourceLink {
@@ -157,12 +151,12 @@ impl UrdfWriting<'_> {
         if let (ArmJoint::Fixed, Some(joint)) = (&link.joint, &there.joint) {
             self.held.insert(joint.clone(), rest(link, &there));
         }
-        let (rotation, origin) = self.carried_by(self.as_written, index).1;
+        let (rotation, origin) = self.carried_by(&self.whole.as_written, index).1;
         self.found.push(index);
         self.stand.push(SourceLink {
             rotation,
             origin,
-            axis: self.as_written[index].axis,
+            axis: self.whole.as_written[index].axis,
             ..there
         });
         Ok(())
@@ -186,8 +180,10 @@ impl UrdfWriting<'_> {
     /// Inertial and friction of one link, and what hangs on it beside the model.
     fn replace(&mut self, i: usize, link: &ArmLink) {
         let there = self.stand[i].clone();
-        let hung: Vec<usize> = (0..self.links.len())
-            .filter(|k| !self.found.contains(k) && self.carried_by(self.links, *k).0 == Some(i))
+        let hung: Vec<usize> = (0..self.whole.links.len())
+            .filter(|k| {
+                !self.found.contains(k) && self.carried_by(&self.whole.links, *k).0 == Some(i)
+            })
             .collect();
         let body = self.body_beside(link, &hung);
         self.out
@@ -208,8 +204,13 @@ impl UrdfWriting<'_> {
 
     /// What is fixed to a link weighs nothing beside it.
     fn bare(&mut self, link: &str) {
-        let links: BTreeSet<&str> = self.links.iter().map(|link| link.name.as_str()).collect();
-        let frames = self.robot.robot.frame.iter();
+        let links: BTreeSet<&str> = self
+            .whole
+            .links
+            .iter()
+            .map(|link| link.name.as_str())
+            .collect();
+        let frames = self.whole.frames.iter();
         let fixed =
             frames.filter(|frame| frame.link == link && !links.contains(frame.name.as_str()));
         self.out.bare.extend(fixed.map(|frame| frame.name.clone()));
@@ -218,8 +219,11 @@ impl UrdfWriting<'_> {
     /// What is left for a link, where others hang on it whose mass is in its own: they keep theirs where the rest is a body.
     fn body_beside(&mut self, link: &ArmLink, hung: &[usize]) -> Body {
         let weight = |k: &usize| {
-            let given = self.robot.robot.link[*k].inertial.as_ref()?;
-            let pose = behind(self.carried_by(self.links, *k).1, &self.links[*k]);
+            let given = self.whole.inertials[*k].as_ref()?;
+            let pose = behind(
+                self.carried_by(&self.whole.links, *k).1,
+                &self.whole.links[*k],
+            );
             Some(seen_from(&given.body(), &pose))
         };
         let bodies: Vec<Body> = hung.iter().filter_map(weight).collect();
@@ -227,14 +231,14 @@ impl UrdfWriting<'_> {
             return link.body;
         }
         let rest = without(&link.body, &bodies);
-        let names = hung.iter().map(|k| self.links[*k].name.as_str());
+        let names = hung.iter().map(|k| self.whole.links[*k].name.as_str());
         let (names, on) = (names.collect::<Vec<&str>>().join(", "), &link.name);
         self.out
             .notes
             .push(hung_in_words(on, &names, rest.is_some()));
         if rest.is_none() {
             for k in hung {
-                let name = self.links[*k].name.clone();
+                let name = self.whole.links[*k].name.clone();
                 self.bare(&name);
                 self.out.inertials.insert(name, inertial(&NEGLIGIBLE));
             }

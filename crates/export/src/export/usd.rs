@@ -31,6 +31,10 @@ impl PrimNames {
     }
 }
 
+/// Of joints whose names USD cannot hold.
+const RENAMED: &str =
+    "Joints whose names have other signs than letters, digits and _ keep them as displayName.";
+
 /// Numbers in brackets.
 fn tuple(values: &[f64]) -> String {
     let all: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
@@ -49,8 +53,6 @@ pub fn usd(arm: &Arm, notes: &[String]) -> String {
     out.push_str(
         "(\n    defaultPrim = \"identified\"\n    metersPerUnit = 1\n    kilogramsPerUnit = 1\n    upAxis = \"Z\"\n)\n\n",
     );
-    out += &hashed(notes);
-    let standing = arm.standing();
     let mut prims = PrimNames::default();
     let scene = prims.name("scene");
     let root = prims.name(&arm.root);
@@ -61,6 +63,15 @@ pub fn usd(arm: &Arm, notes: &[String]) -> String {
         ArmJoint::Fixed => (String::new(), prims.name(&format!("{}_joint", link.name))),
     });
     let joints: Vec<(String, String)> = joints.collect();
+    let mut notes = notes.to_vec();
+    if joints
+        .iter()
+        .any(|(name, prim)| !name.is_empty() && name != prim)
+    {
+        notes.push(RENAMED.to_owned());
+    }
+    out += &hashed(&notes);
+    let standing = arm.standing();
     let _ = write!(
         out,
         "\ndef Xform \"identified\" (\n    prepend apiSchemas = [\"PhysicsArticulationRootAPI\"]\n)\n{{\n    \
@@ -117,7 +128,7 @@ fn joint(
     i: usize,
     [parent, child]: [&String; 2],
 ) {
-    let name = &joints[i].1;
+    let (said, name) = &joints[i];
     // a joint turns about its own z
     let axis = z_to(&link.axis);
     let place = match &link.joint {
@@ -162,13 +173,19 @@ fn joint(
         }
         ArmJoint::Fixed => {}
     }
-    let schemas = match schemas.is_empty() {
-        true => String::new(),
-        false => format!(" (\n        prepend apiSchemas = [{schemas}]\n    )"),
-    };
+    let mut metadata = String::new();
+    if !schemas.is_empty() {
+        let _ = writeln!(metadata, "        prepend apiSchemas = [{schemas}]");
+    }
+    if name != said && !matches!(link.joint, ArmJoint::Fixed) {
+        let _ = writeln!(metadata, "        displayName = \"{}\"", said);
+    }
+    if !metadata.is_empty() {
+        metadata = format!(" (\n{metadata}    )");
+    }
     let _ = write!(
         out,
-        "\n    def {kind} \"{name}\"{schemas}\n    {{\n        rel physics:body0 = </identified/{parent}>\n        \
+        "\n    def {kind} \"{name}\"{metadata}\n    {{\n        rel physics:body0 = </identified/{parent}>\n        \
          rel physics:body1 = </identified/{child}>\n        point3f physics:localPos0 = {}\n        \
          quatf physics:localRot0 = {}\n        point3f physics:localPos1 = (0, 0, 0)\n        \
          quatf physics:localRot1 = {}\n",

@@ -41,4 +41,4 @@ pub use urdf::beside::DRIVE_INERTIA;
 pub use urdf::capsules::DeclaredCapsules;
 pub use urdf::mesh::vertices as vertices_of_mesh;
 pub use urdf::source::{UrdfEdits as UrdfReplacement, WEIGHTLESS, replaced as replaced_in_urdf};
-pub use urdf::{ChainRequest, NO_LIMIT, UrdfChain, xml};
+pub use urdf::{ChainRequest, NO_LIMIT, UrdfChain, WholeUrdf, xml};

@@ -23,13 +23,7 @@ const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 impl RobotSection {
     /// Names of the independent joints of a chain, in the order of its links.
     pub(super) fn chain_joints(&self) -> Vec<String> {
-        let mut names: Vec<String> = Vec::new();
-        for joint in self.link.iter().filter_map(|l| l.joint.as_ref()) {
-            if !names.contains(joint) {
-                names.push(joint.clone());
-            }
-        }
-        names
+        SectionNames::of(&self.link).joints
     }
 
     /// Whether an independent joint turns or slides, by the first link that it moves.
@@ -42,20 +36,12 @@ impl RobotSection {
     }
 
     fn link_names(&self) -> Vec<String> {
-        let name = |(i, l): (usize, &LinkSection)| {
-            l.name.clone().unwrap_or_else(|| format!("link_{}", i + 1))
-        };
-        self.link.iter().enumerate().map(name).collect()
+        SectionNames::of(&self.link).links
     }
 
     /// The serial robot that the section describes.
     pub(super) fn serial(&self) -> Result<Robot, ChainMisfit> {
-        let names = SectionNames {
-            links: self.link_names(),
-            joints: self.chain_joints(),
-        };
-        let links = (0..self.link.len()).map(|i| self.placed_link(i, &names));
-        let links = links.collect::<Result<Vec<Link>, ChainMisfit>>()?;
+        let (links, names) = placed_links(&self.link)?;
         let couplings = self.coupling.iter().map(|c| names.coupling(c));
         let couplings = couplings.collect::<Result<Vec<JointCoupling>, ChainMisfit>>()?;
         let joints = names.joints;
@@ -63,52 +49,6 @@ impl RobotSection {
             .map_err(|error| ChainMisfit::of_tree(&error))?;
         let drive_inertia = self.drive_inertia.unwrap_or(true);
         Ok(Robot::of_tree(tree, joints, drive_inertia, couplings))
-    }
-
-    /// Link `i` on its parent, with what moves it.
-    fn placed_link(&self, i: usize, names: &SectionNames) -> Result<Link, ChainMisfit> {
-        let section = &self.link[i];
-        if names.links[..i].contains(&names.links[i]) {
-            return Err(ChainMisfit::of_link(
-                i,
-                "name",
-                "is the name of another link too",
-                "give each link a name of its own",
-            ));
-        }
-        let parent = names.parent(i, section)?;
-        let coordinate = match (&section.joint, &section.follows) {
-            (Some(joint), None) => {
-                let mut before = self.link[..i].iter();
-                if before.any(|link| link.joint.as_ref() == Some(joint)) {
-                    let remedy = format!(
-                        "let this link follow it: `follows = {{ linear = {{ {joint} = 1.0 }} }}`"
-                    );
-                    let problem = "moves another link too";
-                    return Err(ChainMisfit::of_link(i, "joint", problem, &remedy));
-                }
-                Coordinate::Joint(names.joint(joint).unwrap_or_default())
-            }
-            (None, Some(follows)) => Coordinate::Follows(names.dependence(i, follows)?),
-            _ => {
-                return Err(ChainMisfit::of_link(
-                    i,
-                    "joint",
-                    "must stand in the link, or `follows`, and not both",
-                    "name the joint that moves the link, or say which joints it follows",
-                ));
-            }
-        };
-        let ((rotation, origin), axis) = placement(i, section)?;
-        Ok(Link {
-            name: names.links[i].clone(),
-            parent,
-            rotation,
-            origin,
-            axis,
-            kind: section.kind.unwrap_or(JointKind::Revolute),
-            coordinate,
-        })
     }
 
     /// The robot of a section that was checked.
@@ -144,13 +84,84 @@ fn placement(i: usize, section: &LinkSection) -> Result<((Rotation, Vector), Vec
 }
 
 /// Names that a section gives and refers to.
-struct SectionNames {
+pub(super) struct SectionNames {
     links: Vec<String>,
     /// The independent ones.
-    joints: Vec<String>,
+    pub(super) joints: Vec<String>,
+}
+
+/// Links on their parents, with what moves them, and their names.
+pub(super) fn placed_links(
+    sections: &[LinkSection],
+) -> Result<(Vec<Link>, SectionNames), ChainMisfit> {
+    let names = SectionNames::of(sections);
+    let links = (0..sections.len()).map(|i| names.placed_link(i, sections));
+    Ok((links.collect::<Result<_, _>>()?, names))
 }
 
 impl SectionNames {
+    fn of(sections: &[LinkSection]) -> Self {
+        let name = |(i, l): (usize, &LinkSection)| {
+            l.name.clone().unwrap_or_else(|| format!("link_{}", i + 1))
+        };
+        let mut joints: Vec<String> = Vec::new();
+        for joint in sections.iter().filter_map(|l| l.joint.as_ref()) {
+            if !joints.contains(joint) {
+                joints.push(joint.clone());
+            }
+        }
+        Self {
+            links: sections.iter().enumerate().map(name).collect(),
+            joints,
+        }
+    }
+
+    /// Link `i` on its parent, with what moves it.
+    fn placed_link(&self, i: usize, sections: &[LinkSection]) -> Result<Link, ChainMisfit> {
+        let section = &sections[i];
+        if self.links[..i].contains(&self.links[i]) {
+            return Err(ChainMisfit::of_link(
+                i,
+                "name",
+                "is the name of another link too",
+                "give each link a name of its own",
+            ));
+        }
+        let parent = self.parent(i, section)?;
+        let coordinate = match (&section.joint, &section.follows) {
+            (Some(joint), None) => {
+                let mut before = sections[..i].iter();
+                if before.any(|link| link.joint.as_ref() == Some(joint)) {
+                    let remedy = format!(
+                        "let this link follow it: `follows = {{ linear = {{ {joint} = 1.0 }} }}`"
+                    );
+                    let problem = "moves another link too";
+                    return Err(ChainMisfit::of_link(i, "joint", problem, &remedy));
+                }
+                Coordinate::Joint(self.joint(joint).unwrap_or_default())
+            }
+            (None, Some(follows)) => Coordinate::Follows(self.dependence(i, follows)?),
+            _ => {
+                return Err(ChainMisfit::of_link(
+                    i,
+                    "joint",
+                    "must stand in the link, or `follows`, and not both",
+                    "name the joint that moves the link, or say which joints it follows",
+                ));
+            }
+        };
+        let ((rotation, origin), axis) = placement(i, section)?;
+        Ok(Link {
+            name: self.links[i].clone(),
+            parent,
+            rotation,
+            origin,
+            axis,
+            kind: section.kind.unwrap_or(JointKind::Revolute),
+            coordinate,
+        })
+    }
+
     fn joint(&self, name: &str) -> Option<usize> {
         self.joints.iter().position(|joint| joint == name)
     }
@@ -240,8 +251,8 @@ pub(super) struct ChainMisfit {
     /// Which link, from 0; `None` for the robot as a whole.
     link: Option<usize>,
     key: &'static str,
-    problem: String,
-    remedy: String,
+    pub(super) problem: String,
+    pub(super) remedy: String,
 }
 
 impl ChainMisfit {

@@ -31,6 +31,8 @@ struct SourceWriting<'a, 't, 'p> {
     found: Vec<Option<usize>>,
     links: Vec<Option<SourceLink>>,
     held: BTreeMap<String, f64>,
+    /// Bodies that were made to weigh nothing.
+    weightless: BTreeSet<usize>,
     notes: Vec<String>,
 }
 
@@ -62,6 +64,7 @@ pub fn written(
         found: Vec::new(),
         links: Vec::new(),
         held: BTreeMap::new(),
+        weightless: BTreeSet::new(),
         notes: Vec::new(),
     };
     if let Some(wrong) = writing.layout.wrong.first() {
@@ -71,6 +74,7 @@ pub fn written(
         writing.find(link)?;
     }
     writing.bodies()?;
+    writing.frames();
     writing.bases();
     writing.compilers(root);
     writing.options(root);
@@ -330,12 +334,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
             }
             let body = self.body_beside(link, &hung);
             self.joints_of(index, link);
-            let element = self.layout.bodies[index].element;
-            let anew = inertial(&body);
-            match element.child("inertial") {
-                Some(old) => self.edits.replace(&old, &anew),
-                None => self.edits.put_into(&element, &anew),
-            }
+            self.give(index, &inertial(&body));
         }
         Ok(())
     }
@@ -398,26 +397,48 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
         Some(seen_from(&own, &self.behind(pose, &body.joints)))
     }
 
-    fn weigh_nothing(&mut self, index: usize) {
-        let body = &self.layout.bodies[index];
-        if let Some(old) = body.element.child("inertial") {
-            self.edits.replace(&old, "");
+    /// Frames that say that they have no mass, or say nothing where geoms have no part in it: Drake refuses the one,
+    /// Pinocchio and Drake the other.
+    fn frames(&mut self) {
+        let silent = self.layout.inertia_from_geoms == "false";
+        for index in 0..self.layout.bodies.len() {
+            let body = &self.layout.bodies[index];
+            let none = body.inertial.map_or(silent, |own| own.mass == 0.0);
+            if none && body.joints.is_empty() && !self.found.contains(&Some(index)) {
+                self.weigh_nothing(index);
+            }
         }
-        for geom in &body.geoms {
+    }
+
+    /// A body without mass has no inertial, or the least where none would be refused.
+    fn weigh_nothing(&mut self, index: usize) {
+        if !self.weightless.insert(index) {
+            return;
+        }
+        match self.layout.inertia_from_geoms {
+            "false" => self.give(index, &inertial(&NEGLIGIBLE)),
+            _ => self.give(index, ""),
+        }
+        for geom in &self.layout.bodies[index].geoms {
             self.edits.set(geom, "mass", "0");
         }
     }
 
     /// A body on a joint cannot be without mass.
     fn weigh_little(&mut self, index: usize) {
-        let body = &self.layout.bodies[index];
-        if body.joints.is_empty() {
-            return self.weigh_nothing(index);
+        match self.layout.bodies[index].joints.is_empty() {
+            true => self.weigh_nothing(index),
+            false => self.give(index, &inertial(&NEGLIGIBLE)),
         }
-        let little = inertial(&NEGLIGIBLE);
-        match body.element.child("inertial") {
-            Some(old) => self.edits.replace(&old, &little),
-            None => self.edits.put_into(&body.element, &little),
+    }
+
+    /// Writes the inertial of a body.
+    fn give(&mut self, index: usize, anew: &str) {
+        let element = self.layout.bodies[index].element;
+        match element.child("inertial") {
+            Some(old) => self.edits.replace(&old, anew),
+            None if anew.is_empty() => {}
+            None => self.edits.put_into(&element, anew),
         }
     }
 

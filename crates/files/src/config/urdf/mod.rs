@@ -16,6 +16,7 @@ mod seat;
 mod shapes;
 pub(super) mod source;
 mod tree;
+mod whole;
 pub mod xml;
 
 use std::collections::BTreeMap;
@@ -29,6 +30,7 @@ use super::text_file::text_of;
 use cft_ident_core::robot::tree::space::{Rotation, product};
 use cft_ident_logs::log::{named_beside, remedy, shown};
 use shapes::LinkShape;
+pub use whole::WholeUrdf;
 
 /// A limit that is none, as files of links write it [m, rad, and their rates and torques].
 pub const NO_LIMIT: f64 = 1e16;
