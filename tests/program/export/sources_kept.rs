@@ -99,3 +99,38 @@ fn a_urdf_with_more_joints_than_a_model_can_have_takes_one() {
     let export = bench.export("--urdf out.urdf --urdf-source source.urdf");
     export.success();
 }
+
+#[test]
+fn poses_of_an_mjcf_that_mujoco_alone_reads_are_written_for_all() {
+    const JOINT: &str = r#"<joint name="j3" class="wrist"/>"#;
+    let bench = Bench::arm();
+    let framed = MJCF
+        .replace(
+            "<body name=\"l3\" pos=\"0.4 0 0\">",
+            "<frame pos=\"0.4 0 0.4\" euler=\"0 90 0\" childclass=\"wrist\"><frame pos=\"0.4 0 0\" euler=\"0 -90 0\"><body name=\"l3\">",
+        )
+        .replace(JOINT, "<frame euler=\"90 0 0\"><joint name=\"j3\" axis=\"0 0 -1\"/></frame>")
+        .replace("0.3 0 0\"/>\n        </body>", "0.3 0 0\"/>\n        </body></frame></frame>");
+    let turned = MJCF
+        .replace("angle=\"degree\"", "angle=\"degree\" eulerseq=\"XYZ\"")
+        .replace(
+            JOINT,
+            "<joint name=\"j3\" class=\"wrist\"/><body name=\"tip\" axisangle=\"0 0 2 90\"/>",
+        );
+    let out = bench.mjcf_from(&framed);
+    assert!(!out.contains("<frame") && !out.contains("</frame"), "{out}");
+    assert!(out.contains("childclass=\"wrist\""), "{out}");
+    let out = bench.mjcf_from(&turned);
+    let body = out.split("-->").nth(1).unwrap();
+    assert!(
+        !body.contains("euler=") && !body.contains("axisangle"),
+        "{out}"
+    );
+    // what else a frame holds stays in it, and the head says who reads it
+    let held = framed.replace("<body name=\"l3\">", "<site name=\"s\"/><body name=\"l3\">");
+    let out = bench.mjcf_from(&held);
+    assert!(
+        out.contains("<frame") && out.contains("MuJoCo alone reads it"),
+        "{out}"
+    );
+}

@@ -11,6 +11,8 @@ pub(super) struct TextEdits<'p> {
     plain: &'p str,
     /// Attributes to be set or taken out, by the place of their tag.
     tags: BTreeMap<usize, Vec<(&'static str, Option<String>)>>,
+    /// What elements of a single tag are to hold, by the place of that.
+    filled: BTreeMap<usize, String>,
     pieces: Vec<(Range<usize>, String)>,
 }
 
@@ -19,6 +21,7 @@ impl<'p> TextEdits<'p> {
         Self {
             plain,
             tags: BTreeMap::new(),
+            filled: BTreeMap::new(),
             pieces: Vec::new(),
         }
     }
@@ -69,15 +72,29 @@ impl<'p> TextEdits<'p> {
         self.pieces.push((end..end, text.to_owned()));
     }
 
+    /// Takes the tags of an element away, what it holds stays.
+    pub(super) fn unwrap(&mut self, of: &Element) {
+        let range = of.range();
+        let end = tag_end(self.plain, range.start);
+        self.pieces.push((range.start..end, String::new()));
+        if let Some(at) = self.plain[end..range.end].rfind("</") {
+            self.pieces.push((end + at..range.end, String::new()));
+        }
+    }
+
     pub(super) fn made(self, text: &str) -> String {
         let mut pieces = self.pieces;
         for (begin, attributes) in self.tags {
             let tag = begin..tag_end(self.plain, begin);
-            let anew = attributes
+            let mut anew = attributes
                 .iter()
                 .fold(self.plain[tag.clone()].to_owned(), |tag, (name, value)| {
                     with_attribute(&tag, name, value.as_deref())
                 });
+            if let Some(inner) = self.filled.get(&begin) {
+                anew.truncate(anew.len() - 2);
+                anew.push_str(inner);
+            }
             pieces.push((tag, anew));
         }
         // what is put behind a tag begins where that ends; what stands before another stays before it

@@ -1,6 +1,6 @@
 //! Tables of docs/results/simulators.md.
 
-use super::tables::{Rendered, json, number, rows, table, text};
+use super::tables::{number, rows, table, text};
 use cft_ident::number::significant;
 use serde_json::Value;
 
@@ -100,49 +100,55 @@ pub fn probes(result: &Value) -> String {
 
 /// The largest difference of torque of each robot in each format and reader, over the joint's torque; of newton over the
 /// largest joint's.
-pub fn same_robot(results: &[&str]) -> Rendered {
-    let mut out = Vec::new();
-    for result in results {
-        let result = json(result)?;
-        for row in rows(&result["rows"]) {
-            let key = if text(&row["reader"]) == "newton" {
-                "largest"
-            } else {
-                "joint"
-            };
-            let size = match row[key].as_f64() {
-                Some(size) => format!("{size:.0e}"),
-                None => "refused".to_owned(),
-            };
-            let place = format!("{} {}", text(&row["format"]), text(&row["reader"]));
-            out.push((text(&row["robot"]).to_owned(), place, size));
-        }
-    }
-    let mut places: Vec<&str> = Vec::new();
+pub fn same_robot(result: &Value) -> String {
+    let all = rows(&result["rows"]);
+    let of = |row: &Value, keys: &[&str]| -> Vec<String> {
+        keys.iter().map(|key| text(&row[key]).to_owned()).collect()
+    };
+    let mut places: Vec<Vec<String>> = Vec::new();
     let mut robots: Vec<&str> = Vec::new();
-    for (robot, place, _) in &out {
-        if !robots.contains(&robot.as_str()) {
+    for row in all {
+        let (robot, place) = (text(&row["robot"]), of(row, &["format", "reader"]));
+        if !robots.contains(&robot) {
             robots.push(robot);
         }
-        if !places.contains(&place.as_str()) {
+        if place[1] != "export" && !places.contains(&place) {
             places.push(place);
         }
     }
-    let each = places.iter().map(|place| {
-        let size = |robot: &&str| {
-            let found = out.iter().find(|(of, at, _)| of == robot && at == place);
-            found.map_or("-".to_owned(), |(.., size)| size.clone())
+    places.sort();
+    let cell = |robot: &str, place: &[String]| {
+        let mut of_robot = all.iter().filter(|row| text(&row["robot"]) == robot);
+        let found = of_robot
+            .clone()
+            .find(|row| of(row, &["format", "reader"]) == place);
+        let Some(row) = found else {
+            let refused =
+                of_robot.any(|row| of(row, &["format", "reader"]) == [&place[0], "export"]);
+            return if refused { "no export" } else { "-" }.to_owned();
         };
-        let head = [(*place).to_owned()];
-        head.into_iter().chain(robots.iter().map(size)).collect()
+        let key = if place[1] == "newton" {
+            "largest"
+        } else {
+            "joint"
+        };
+        match row[key].as_f64() {
+            Some(size) => format!("{size:.0e}"),
+            None if text(&row["said"]).starts_with("the source alone") => {
+                "source refused".to_owned()
+            }
+            None => "refused".to_owned(),
+        }
+    };
+    let each = robots.iter().map(|robot| {
+        let cells = places.iter().map(|place| cell(robot, place));
+        [(*robot).to_owned()].into_iter().chain(cells).collect()
     });
-    let columns = ["<format, reader"]
+    let columns: Vec<String> = places.iter().map(|place| place.join(" ")).collect();
+    let columns = ["<robot"]
         .into_iter()
-        .chain(robots.iter().copied());
-    Ok(table(
-        &columns.collect::<Vec<_>>(),
-        &each.collect::<Vec<_>>(),
-    ))
+        .chain(columns.iter().map(String::as_str));
+    table(&columns.collect::<Vec<_>>(), &each.collect::<Vec<_>>())
 }
 
 /// Errors of windows that were replayed in a simulator.

@@ -32,7 +32,7 @@ pub fn render(words: &[&str]) -> Rendered {
         ["replay", result] => Ok(simulators::replay(&json(result)?)),
         ["readers", result] => Ok(simulators::readers(&json(result)?)),
         ["probes", result] => Ok(simulators::probes(&json(result)?)),
-        ["same-robot", results @ ..] => simulators::same_robot(results),
+        ["same-robot", result] => Ok(simulators::same_robot(&json(result)?)),
         ["text", name] => {
             let text = read(&format!("{name}.txt"))?;
             Ok(format!("```text\n{}\n```\n", text.trim_end()))

@@ -19,6 +19,8 @@ pub(super) struct SourceBody<'a, 't> {
     pub joints: Vec<SourceJoint<'a, 't>>,
     pub inertial: Option<Body>,
     pub geoms: Vec<Element<'a, 't>>,
+    /// `<frame>`s around it in the body before, the outermost first.
+    pub frames: Vec<Element<'a, 't>>,
     /// Elements whose bodies or weights are not read, by name and line.
     pub unread: Option<(&'a str, usize)>,
 }
@@ -36,6 +38,8 @@ pub(super) struct SourceJoint<'a, 't> {
     pub reference: f64,
     /// Class of what it stands in.
     pub class: &'a str,
+    /// `<frame>`s around it in the body.
+    pub frames: Vec<Element<'a, 't>>,
 }
 
 /// A joint that follows another one: `to` = law of the way of `of`.
@@ -52,6 +56,8 @@ pub(super) struct SourceLayout<'a, 't> {
     /// Whether bodies weigh by their geoms: `true`, `false`, or `auto` where they have no inertial.
     pub inertia_from_geoms: &'a str,
     classes: BTreeMap<&'a str, Vec<Element<'a, 't>>>,
+    /// `<frame>`s around what is read next.
+    around: Vec<Element<'a, 't>>,
     units: AngleUnits<'a>,
     /// Values that are no numbers, in words.
     pub wrong: Vec<String>,
@@ -86,6 +92,7 @@ impl<'a, 't> SourceLayout<'a, 't> {
             ties: Vec::new(),
             inertia_from_geoms: "auto",
             classes: BTreeMap::new(),
+            around: Vec::new(),
             units: AngleUnits {
                 angle: 1f64.to_radians(),
                 sequence: "xyz",
@@ -179,7 +186,9 @@ impl<'a, 't> SourceLayout<'a, 't> {
                 ("body", _) => self.add_body(child, body, &frame, class),
                 ("frame", _) => {
                     let inner = composed(&frame, &self.pose(&child));
+                    self.around.push(child);
                     self.walk(child, body, inner, class);
+                    self.around.pop();
                 }
                 ("joint" | "freejoint", Some(body)) => self.add_joint(child, body, &frame, class),
                 ("geom", Some(body)) => self.bodies[body].geoms.push(child),
@@ -210,9 +219,12 @@ impl<'a, 't> SourceLayout<'a, 't> {
             joints: Vec::new(),
             inertial,
             geoms: Vec::new(),
+            frames: std::mem::take(&mut self.around),
             unread: None,
         });
-        self.walk(of, Some(self.bodies.len() - 1), HERE, class);
+        let index = self.bodies.len() - 1;
+        self.walk(of, Some(index), HERE, class);
+        self.around.clone_from(&self.bodies[index].frames);
     }
 
     fn inertial(&mut self, of: &Element<'a, 't>) -> Body {
@@ -254,11 +266,22 @@ impl<'a, 't> SourceLayout<'a, 't> {
             point: composed(frame, &(UNTURNED, point)).1,
             reference: unit * reference,
             class,
+            frames: self.around.clone(),
         });
     }
 
+    /// Whether Pinocchio reads the orientation of an element otherwise than MuJoCo: angles about axes that stand still, and an
+    /// axis whose length is not 1.
+    pub(super) fn is_misread(&self, of: &Element) -> bool {
+        let still = self
+            .units
+            .sequence
+            .contains(|c: char| c.is_ascii_uppercase());
+        of.attribute("euler").is_some() && still || of.attribute("axisangle").is_some()
+    }
+
     /// Position and orientation of an element.
-    fn pose(&mut self, of: &Element<'a, 't>) -> Pose {
+    pub(super) fn pose(&mut self, of: &Element<'a, 't>) -> Pose {
         let text = of.attribute("pos").unwrap_or_default();
         let origin = self.numbers(text, [0.0; 3], of);
         (self.rotation(of), origin)
@@ -310,6 +333,15 @@ impl<'a, 't> SourceLayout<'a, 't> {
         }
         UNTURNED
     }
+}
+
+/// Whether a `<frame>` can be taken away: it holds bodies and joints alone, whose own poses can be written.
+pub(super) fn is_dissolved(frame: &Element) -> bool {
+    frame.children().all(|child| match child.name() {
+        "body" | "joint" => true,
+        "frame" => is_dissolved(&child),
+        _ => false,
+    })
 }
 
 /// A vector of length 1.

@@ -2,6 +2,7 @@
 //! while MuJoCo compiles the file is taken out.
 
 mod layout;
+mod poses;
 mod settings;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,8 +32,8 @@ struct SourceWriting<'a, 't, 'p> {
     found: Vec<Option<usize>>,
     links: Vec<Option<SourceLink>>,
     held: BTreeMap<String, f64>,
-    /// Bodies that were made to weigh nothing.
-    weightless: BTreeSet<usize>,
+    /// Bodies whose inertials are written anew.
+    given: BTreeSet<usize>,
     notes: Vec<String>,
 }
 
@@ -64,7 +65,7 @@ pub fn written(
         found: Vec::new(),
         links: Vec::new(),
         held: BTreeMap::new(),
-        weightless: BTreeSet::new(),
+        given: BTreeSet::new(),
         notes: Vec::new(),
     };
     if let Some(wrong) = writing.layout.wrong.first() {
@@ -76,6 +77,7 @@ pub fn written(
     writing.bodies()?;
     writing.frames();
     writing.bases();
+    writing.poses();
     writing.compilers(root);
     writing.options(root);
     writing.actuators(root);
@@ -412,7 +414,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
 
     /// A body without mass has no inertial, or the least where none would be refused.
     fn weigh_nothing(&mut self, index: usize) {
-        if !self.weightless.insert(index) {
+        if self.given.contains(&index) {
             return;
         }
         match self.layout.inertia_from_geoms {
@@ -434,6 +436,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
 
     /// Writes the inertial of a body.
     fn give(&mut self, index: usize, anew: &str) {
+        self.given.insert(index);
         let element = self.layout.bodies[index].element;
         match element.child("inertial") {
             Some(old) => self.edits.replace(&old, anew),
@@ -464,6 +467,10 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
         let body = &self.layout.bodies[index];
         let joints = body.joints.iter();
         for joint in joints.filter(|joint| name.as_ref().is_none_or(|name| joint.name == name)) {
+            if joint.reference != 0.0 {
+                let text = format!("joint {} has a ref, which newton skips.", joint.name);
+                self.notes.push(text);
+            }
             for (key, x) in ["armature", "damping", "frictionloss"].iter().zip(&numbers) {
                 self.edits.set(&joint.element, key, x);
             }
