@@ -440,6 +440,16 @@ fn followers_get_their_inertials_and_no_friction_beside_that_of_the_joint_that_t
         );
         // the equality of the source, and no second one
         assert_eq!(text.matches("joint1=").count(), 1);
+        if name == "right" {
+            bench.write(
+                "source.xml",
+                &source.replace("</mujoco>", &tie.replace("-2", "-1")),
+            );
+            let other = bench
+                .export("--mjcf out.xml --mjcf-source source.xml")
+                .failure();
+            other.stderr(contains("follows `left_joint` by 0.1 -1.0"));
+        }
     }
     // one that is not there is named, with what it carries
     let one = finger("left", "left_joint", "0.04", "0 0 1");

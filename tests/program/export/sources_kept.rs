@@ -14,6 +14,15 @@ fn the_base_of_an_mjcf_keeps_its_pose_where_the_first_body_has_none() {
     let out = bench.mjcf_from(&placed);
     assert!(out.contains("<body name=\"desk_fixed\">\n<body name=\"desk\" pos=\"0 0 1\">"));
     assert!(out.contains("body desk stands in one without a pose"));
+    let told = placed.replace(
+        "angle=\"degree\"",
+        "angle=\"degree\" inertiafromgeom=\"false\"",
+    );
+    let out = bench.mjcf_from(&told);
+    assert!(
+        out.contains("<body name=\"desk_fixed\">\n<inertial"),
+        "{out}"
+    );
     // a base without a pose stays as it is
     let bare = bench.mjcf_from(MJCF);
     assert!(!bare.contains("_fixed"), "{bare}");

@@ -123,7 +123,11 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
                 of, factor, offset, ..
             } => {
                 let master = self.called(of);
-                self.follower(link, &master, [*offset, *factor])
+                let index = self.follower(link, &master, [*offset, *factor]);
+                if let Some(index) = index {
+                    self.check_law(index, &master, [*offset, *factor])?;
+                }
+                index
             }
         };
         self.found.push(index);

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use super::SourceWriting;
 use super::layout::ACTUATORS;
-use crate::export::mjcf::tendons;
+use crate::export::error::ExportError;
+use crate::export::mjcf::{inertial, tendons};
 use crate::export::prepared::{UsedNames, words};
 use crate::export::source_link::{HERE, NEGLIGIBLE};
 use cft_ident_files::config::xml::Element;
@@ -29,6 +30,41 @@ const FLAGS: [&str; 6] = [
 ];
 
 impl<'p, 't> SourceWriting<'_, 't, 'p> {
+    /// Refuses a body that follows joint `master` otherwise than by this offset and factor.
+    pub(super) fn check_law(
+        &self,
+        index: usize,
+        master: &str,
+        wanted: [f64; 2],
+    ) -> Result<(), ExportError> {
+        let bodies = &self.layout.bodies;
+        let Some(joint) = bodies[index].joints.first() else {
+            return Ok(());
+        };
+        let mut ties = self.layout.ties.iter();
+        let tie = ties.find(|tie| tie.follower == joint.name);
+        let mut all = bodies.iter().flat_map(|body| &body.joints);
+        let law = match (tie, all.find(|other| other.name == master)) {
+            (None, _) => "follows nothing there".to_owned(),
+            // a follower of a follower is judged by its torques
+            (Some(tie), Some(of)) if tie.of == master => {
+                let [c0, c1, bends @ ..] = tie.law;
+                let law = [joint.reference + c0 - c1 * of.reference, c1];
+                let near = |(a, b): (f64, f64)| (a - b).abs() <= 1e-5 * b.abs().max(1.0);
+                if bends == [0.0; 3] && law.into_iter().zip(wanted).all(near) {
+                    return Ok(());
+                }
+                format!("follows `{master}` by {} there", words(&tie.law))
+            }
+            _ => return Ok(()),
+        };
+        let name = joint.name;
+        Err(self.source.refused(
+            format!("joint `{name}` {law}, by {} in the model", words(&wanted)),
+            "correct the polycoef of its <equality>, or identify with a robot file of this robot",
+        ))
+    }
+
     /// Puts what the robot is fixed to the world by into a body without a pose: of the outermost body Pinocchio skips it.
     pub(super) fn bases(&mut self) {
         let bodies = &self.layout.bodies;
@@ -44,7 +80,11 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
         for base in bases.into_iter().map(|k| &bodies[k]) {
             if base.joints.is_empty() && base.pose != HERE {
                 let around = names.give(format!("{}_fixed", base.name));
-                let begin = format!("<body name=\"{around}\">\n");
+                let own = match self.layout.inertia_from_geoms {
+                    "false" => inertial(&NEGLIGIBLE),
+                    _ => String::new(),
+                };
+                let begin = format!("<body name=\"{around}\">\n{own}");
                 self.edits.put_before(&base.element, begin);
                 self.edits.put_behind(&base.element, "\n</body>");
                 self.notes.push(format!(
