@@ -7,6 +7,7 @@ pub mod data_split;
 pub mod fit;
 pub mod formula_numbers;
 pub mod pass;
+pub mod prediction_numbers;
 pub mod prior;
 pub(crate) mod rests;
 pub mod unknowns;
