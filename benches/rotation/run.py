@@ -5,7 +5,8 @@ Usage: run.py TOOL RESULT.json [--label NAME] [--only TEXT] [--jobs N] [--diagno
 
 Every measured robot with logs enough is rotated: each log, or third of a log, is unseen in turn, and the others are
 fitted. `lsq` writes the model before, `diagnose` the model after, without held-out data; `validate` gives the errors of
-both on the unseen part, of the rows in which each joint moves. --diagnose takes another build for `diagnose` alone.
+both on the unseen part, of the rows in which each joint moves and of all. --diagnose takes another build for `diagnose`
+alone, --named-only what is named alone.
 Cases that RESULT.json (committed: result.json beside this file) holds under the label are not run again.
 """
 
@@ -70,13 +71,14 @@ def run(command):
     return done.returncode, done.stderr
 
 
-def moving(tool, log, model, work):
+def errors(tool, log, model, work):
     out = work / "errors.json"
     code, error = run([tool, "validate", log, "-m", model, "--json", out, "-q"])
     if code not in (0, 2):
         raise RuntimeError(error)
     joints = json.loads(out.read_text())["joints"]
-    return {j["joint"]: j.get("relative_error_moving") or j["relative_error"] for j in joints}
+    moving = {j["joint"]: j.get("relative_error_moving") or j["relative_error"] for j in joints}
+    return moving, {j["joint"]: j["relative_error"] for j in joints}
 
 
 def case(args, machine, robot, fitted, unseen):
@@ -87,15 +89,19 @@ def case(args, machine, robot, fitted, unseen):
         code, error = run([args.tool, "lsq", *fitted, "-r", robot, "-o", before, "-q"])
         if code == 0:
             diagnose = args.diagnose or args.tool
-            code, error = run([diagnose, "diagnose", *fitted, "-m", before, "-o", after, "--json", found, "-q"])
+            alone = ["--named-only"] if args.named_only else []
+            code, error = run([diagnose, "diagnose", *fitted, "-m", before, "-o", after, "--json", found, "-q", *alone])
         if code != 0:
             return {**row, "exit": code, "error": error.strip()[:400]}
-        steps = json.loads(found.read_text())["steps"]
+        document = json.loads(found.read_text())
+        steps = document["steps"]
         row["written"] = [[s["effect"], s["joint"], s["status"], round(s["shrinkage"], 3)] for s in steps if s["written"]]
+        predicting = document.get("prediction_only", [])
+        row["predicting"] = [[t["effect"], t["joint"], round(t["shrinkage"], 3)] for t in predicting]
         row["seen"] = [[s["effect"], s["joint"], round(s["shrinkage"], 3)] for s in steps if not s["written"]]
         try:
-            row["before"] = moving(args.tool, unseen, before, work)
-            row["after"] = moving(args.tool, unseen, after, work)
+            row["before"], row["before_all"] = errors(args.tool, unseen, before, work)
+            row["after"], row["after_all"] = errors(args.tool, unseen, after, work)
         except RuntimeError as error:
             return {**row, "exit": 3, "error": str(error).strip()[:400]}
         return {**row, "exit": 0}
@@ -104,17 +110,32 @@ def case(args, machine, robot, fitted, unseen):
 def summary(rows):
     for label in dict.fromkeys(r["label"] for r in rows):
         own = [r for r in rows if r["label"] == label and r["exit"] == 0]
-        ratios = [(r["case"], j, r["before"][j], r["after"][j]) for r in own for j in r["before"]]
-        ratios = [x for x in ratios if x[2] < 0.5]
-        gains = sorted(1 - after / before for _, _, before, after in ratios)
-        if not gains:
-            continue
-        mean, median = sum(gains) / len(gains), gains[len(gains) // 2]
-        print(f"{label}: {len(own)} cases, {len(gains)} joints: mean gain {mean:.1%}, median {median:.1%}, "
-              f"{sum(g < -.02 for g in gains)} more than 2 % worse, {sum(g < -.07 for g in gains)} more than 7 %")
-        for name, joint, before, after in sorted(ratios, key=lambda x: x[2] / x[3])[:8]:
+        print(f"{label}: {len(own)} cases")
+        for machine in [*dict.fromkeys(r["machine"] for r in own), "all"]:
+            of = [r for r in own if machine in ("all", r["machine"])]
+            print(f"   {machine:9}", "; ".join(filter(None, [gains(of, ""), gains(of, "_all"), terms(of)])))
+        for name, joint, before, after in sorted(ratios(own, ""), key=lambda x: x[2] / x[3])[:8]:
             if after > 1.02 * before:
                 print(f"   {name}, {joint}: {before:.2%} -> {after:.2%}")
+
+
+def ratios(rows, which):
+    """Case, joint, error before and after, of joints that the model explains."""
+    all_of = [(r["case"], j, e, r["after" + which][j]) for r in rows for j, e in r.get("before" + which, {}).items()]
+    return [x for x in all_of if x[2] < 0.5]
+
+
+def gains(rows, which):
+    own = sorted(1 - after / before for _, _, before, after in ratios(rows, which))
+    if not own:
+        return ""
+    worse = sum(g < -.02 for g in own)
+    rows_of = "all rows" if which else "in motion"
+    return f"{rows_of}: {len(own)} joints, gain {sum(own) / len(own):.1%}, {worse} more than 2 % worse, worst {own[0]:.1%}"
+
+
+def terms(rows):
+    return f"{sum(len(r['written']) for r in rows)} named, {sum(len(r.get('predicting', [])) for r in rows)} for prediction only"
 
 
 def main():
@@ -125,6 +146,7 @@ def main():
     parser.add_argument("--only", default="")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--diagnose")
+    parser.add_argument("--named-only", action="store_true")
     args = parser.parse_args()
     rows = json.loads(args.result.read_text()) if args.result.exists() else []
     done = {(r["case"], r["label"]) for r in rows}
@@ -134,7 +156,7 @@ def main():
         for row in pool.map(lambda c: case(args, *c), cases):
             rows.append(row)
             args.result.write_text(json.dumps(rows, indent=1) + "\n")
-            shown = row.get("error") or ", ".join(f"{e[0]} {e[1]} {e[3]}" for e in row["written"])
+            shown = row.get("error") or ", ".join(f"{e[0]} {e[1]} {e[-1]}" for e in row["written"] + row["predicting"])
             print(f"{row['case']}: {shown}", file=sys.stderr, flush=True)
     summary(rows)
 

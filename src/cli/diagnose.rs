@@ -52,10 +52,13 @@ pub struct Args {
     /// may be given more than once
     #[arg(hide_short_help = true, long, value_name = "EFFECT:JOINT")]
     pub accept: Vec<String>,
+    /// Write what is named alone, and nothing for prediction only
+    #[arg(long)]
+    pub named_only: bool,
     /// Go on with the set-up as it is declared, whatever the torques say
     #[arg(hide_short_help = true, long)]
     pub as_declared: bool,
-    /// Refined model file to write: the given one, byte for byte, where nothing is confirmed
+    /// Refined model file to write: the given one, byte for byte, where nothing is added
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
     /// Draw the residual before and after; may be given more than once
@@ -94,6 +97,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 .iter()
                 .map(|text| AcceptedEffect::named(text))
                 .collect(),
+            named_only: args.named_only,
         },
     };
     // before the logs are looked at
@@ -161,13 +165,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     }
     if let Some(path) = &args.output {
-        let unchanged = found.diagnosis.written().next().is_none();
+        let unchanged = !found.diagnosis.changes_model();
         match unchanged {
             true => context.write_text(path, &files::text(&args.model)?)?,
             false => files::write_model(path, &refined, context)?,
         }
         let unchanged = match unchanged {
-            true => ", the given model byte for byte: nothing is confirmed",
+            true => ", the given model byte for byte: nothing is added",
             false => "",
         };
         let written = format!("written: {}{unchanged}", path.display());

@@ -109,7 +109,7 @@ fn the_few_strokes_of_a_short_log_agree_on_asymmetric_friction_and_unseen_data_g
     let mut arguments = vec!["diagnose", &id, "-m", "declared.toml"];
     arguments.extend(["--holdout", &unseen, "-o", "refined.toml"]);
     let found = run(at, &arguments);
-    assert_eq!(found["schema"], "cft-ident/diagnose/3");
+    assert_eq!(found["schema"], "cft-ident/diagnose/4");
     let first = &found["steps"][0];
     assert_eq!(first["effect"], "asymmetric-friction");
     assert_eq!(

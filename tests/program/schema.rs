@@ -66,7 +66,7 @@ fn committed_results_have_the_schema_of_their_command() {
             Some("cft-ident/friction/1") => SchemaKind::Friction,
             Some("cft-ident/lsq/1") => SchemaKind::Lsq,
             Some("cft-ident/validate/1") => SchemaKind::Validate,
-            Some("cft-ident/diagnose/3") => SchemaKind::Diagnose,
+            Some("cft-ident/diagnose/4") => SchemaKind::Diagnose,
             Some("cft-ident/drive/1") => SchemaKind::Drive,
             Some(other) => panic!("{other}"),
             None => continue,

@@ -121,7 +121,7 @@ pub fn identify<E: From<IdentifyError>>(
     let roles = Dataset::new(setup, &train).with_held_out(&data.held_out);
     let diagnosed = diagnose(&roles, &DiagnoseSettings::of(&given), control);
     let refined = match &diagnosed {
-        Ok(DiagnoseEnd::Diagnosed(found)) if found.diagnosis.written().next().is_some() => {
+        Ok(DiagnoseEnd::Diagnosed(found)) if found.diagnosis.changes_model() => {
             let refined = found.model(setup, &given.file);
             ended(StageEnd::Refined(&refined))?;
             Some(refined)

@@ -168,6 +168,21 @@ fn shape_ranges(
     ranges.into_iter().enumerate().map(of).collect()
 }
 
+/// The shape that stands at an end of its range, beyond which another law begins, with that end.
+pub fn shape_end(
+    model: &AugmentedModel,
+    case: &DiagnosisCase,
+    cover: &LogCoverage,
+    effect: &ModelEffect,
+) -> Option<(&'static str, f64)> {
+    let ranges = shape_ranges(model, case, cover, effect).into_iter();
+    let mut ends = ranges.enumerate().filter_map(|(k, range)| {
+        let end = range.end_at(effect.shape[k])?;
+        Some((effect.law.shape[k], end))
+    });
+    ends.next()
+}
+
 /// Why an effect with its numbers is no finding, where it is none: a shape stands at an end of its range, beyond which
 /// the law is another or nothing is left of it; it has no torque; or its numbers together are none that a machine has.
 pub fn no_finding(
@@ -176,22 +191,22 @@ pub fn no_finding(
     cover: &LogCoverage,
     effect: &ModelEffect,
 ) -> Option<String> {
-    let law = effect.law;
     if effect.linear.iter().all(|x| *x == 0.0) || !effect.can_be() {
         return Some("its size is at a bound, where it has no torque".to_owned());
     }
-    let ranges = shape_ranges(model, case, cover, effect).into_iter();
-    let mut ends = ranges.enumerate().filter_map(|(k, range)| {
-        let end = range.end_at(effect.shape[k])?;
-        Some((law.shape[k], end))
-    });
-    if let Some((key, end)) = ends.next() {
+    if let Some((key, end)) = shape_end(model, case, cover, effect) {
         return Some(format!(
             "{key} stands at {}, an end of its range: beyond it another law begins",
             number::significant(end, 3)
         ));
     }
     let seen = seen(model, cover, case, effect.place);
+    if let Some((key, most)) = beyond_the_joint(effect, seen.cover.torque) {
+        return Some(format!(
+            "{key} is more than {}, the greatest torque of the joint",
+            number::significant(most, 3)
+        ));
+    }
     // an amplitude beyond its usual size is told as large, and is there; bounds of single numbers are those of the fit
     let told = |rule: &Rule| {
         matches!(
@@ -200,6 +215,21 @@ pub fn no_finding(
         )
     };
     effect.broken(&seen, &told).map(|(_, why)| why)
+}
+
+/// The size of an effect that is a torque greater than `most`, the greatest that the joint took, with that: only the others in the fit can
+/// hold against it. What hangs on the pose may be greater at poses that were not seen.
+fn beyond_the_joint(effect: &ModelEffect, most: f64) -> Option<(&'static str, f64)> {
+    let entry = effect.law.entry;
+    let by_pose = effect.family() == Family::Position && entry.search != ShapeSearch::Orders;
+    let keys = effect.law.keys(&effect.shape, &effect.linear);
+    let too_great = keys.iter().find(|of| {
+        let key = entry
+            .key(of.key)
+            .filter(|key| key.size && key.unit == Unit::Torque);
+        key.is_some() && of.value.abs() > most
+    });
+    too_great.filter(|_| !by_pose).map(|of| (of.key, most))
 }
 
 /// Values that a coefficient can have.
@@ -250,5 +280,24 @@ fn seen<'a>(
         friction: &model.model.friction[j],
         drive: &case.drives[j],
         weight: cover.joints[j].weight,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{settling_drift, weight};
+
+    #[test]
+    fn a_torque_beyond_all_that_the_joint_took_is_no_size_of_an_effect_but_of_one_by_the_pose() {
+        let of = |law, shape: &[f64], linear: &[f64]| {
+            let effect = ModelEffect::new(law, EffectPlace::Joint(0), shape.into(), linear.into());
+            beyond_the_joint(&effect, 973.0)
+        };
+        let drift = |level| of(&settling_drift::LAW, &[0.5], &[level]);
+        assert_eq!(drift(13_901.0), Some(("level", 973.0)));
+        assert_eq!(drift(-2000.0), Some(("level", 973.0)));
+        assert_eq!(drift(-40.0), None);
+        assert_eq!(of(&weight::LAW, &[], &[2000.0, 100.0]), None);
     }
 }

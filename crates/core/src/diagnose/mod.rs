@@ -34,11 +34,12 @@ mod watch;
 pub use error::DiagnoseError;
 pub use outcome::{
     Diagnosis, FormulaEnd, FormulaPicture, FormulaSymmetry, FoundEffect, FoundFormula,
-    FrictionChange, LeftCandidate, NotWritten, SplitErrors, StepStatus,
+    FrictionChange, LeftCandidate, NotWritten, PredictingTerm, SplitErrors, StepStatus,
 };
 pub use problem::case::{AcceptedEffect, DiagnosisCase, DiagnosisOptions};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::formula_numbers::{FORMULA_NUMBERS, FormulaNumbers};
+pub use problem::prediction_numbers::{PREDICTION_NUMBERS, PredictionNumbers};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown, value_of};
 pub use refit::{ModelProposal, ModelRefit};

@@ -39,6 +39,8 @@ pub enum NotWritten {
     Small,
     /// Held-out data are worse with it.
     HeldOut,
+    /// One of the fitted logs, left out, is worse predicted with it by the others.
+    OtherLogs,
 }
 
 /// One effect that gained on blocks left out.
@@ -84,6 +86,26 @@ impl FoundEffect {
     pub fn vetoed(&self) -> bool {
         self.left == Some(NotWritten::HeldOut)
     }
+}
+
+/// A term that is written because it predicts, shrunk by what of it may be chance; it is no statement on the machine.
+#[derive(Debug, Clone)]
+pub struct PredictingTerm {
+    /// With the amplitude of the fit of all that is written.
+    pub estimate: ModelEffect,
+    /// Its place in the effects of the model that is written.
+    pub written: usize,
+    /// Part of the amplitude that is written, 0..1.
+    pub shrinkage: f64,
+    /// How many deviations one number would have to be off zero to be as sure.
+    pub deviations: f64,
+    /// Root mean square of its torque at the joint where it is strongest, and the standard deviation [N or Nm].
+    pub torque: [f64; 2],
+    /// Gain on blocks left out, beside all that stand.
+    pub gain: ErrorGain,
+    /// Root mean square of its joint's torque error on held-out rows without and with it, the others refitted [N or Nm];
+    /// none where nothing is held out or it acts on several joints.
+    pub held_out: Option<[f64; 2]>,
 }
 
 /// A candidate that was not chosen.
@@ -204,14 +226,18 @@ pub struct Diagnosis {
     /// The declared parameters of the joint fit with every effect that stands, unshrunk.
     pub estimates: AugmentedModel,
     pub steps: Vec<FoundEffect>,
+    /// Terms that are written because they predict, and not because any of them is sure.
+    pub predicting: Vec<PredictingTerm>,
+    /// Number of independent stretches of motion, where they are too few for that.
+    pub too_few_stretches: Option<usize>,
     pub candidates: Vec<LeftCandidate>,
     pub before: SplitErrors,
     /// The declared model refitted to these logs, with nothing added.
-    pub refitted: UseErrors,
-    /// With every effect that stood before held-out data had a say.
+    pub refitted: SplitErrors,
+    /// By the model with what is named alone.
+    pub named: SplitErrors,
+    /// By the model that is written.
     pub after: SplitErrors,
-    /// By the model that is written, where held-out data took something out of it.
-    pub selected: Option<SplitErrors>,
     /// What the model that is written leaves.
     pub left: WhatIsLeft,
     /// The same of the declared model alone, where something was added to it.
@@ -261,9 +287,9 @@ impl Diagnosis {
         self.steps.iter().any(FoundEffect::vetoed)
     }
 
-    /// Errors of the model that is written.
-    pub fn errors_now(&self) -> &SplitErrors {
-        self.selected.as_ref().unwrap_or(&self.after)
+    /// Whether the model that is written is another than the given one.
+    pub fn changes_model(&self) -> bool {
+        self.written().next().is_some() || !self.predicting.is_empty()
     }
 
     /// Whether there is data enough for anything to be written.
@@ -278,10 +304,14 @@ pub struct JudgedEffects {
     pub steps: Vec<FoundEffect>,
     /// With the declared numbers by the judge's sums; the given model where nothing is written.
     pub proposed: AugmentedModel,
-    /// As torques are computed, before held-out data took anything out.
-    pub judge: AugmentedModel,
-    /// As torques are computed; the given model where nothing is left.
+    /// With what is named alone, as torques are computed; the given model where nothing is.
+    pub named: AugmentedModel,
+    /// The same with what is written for prediction alone.
     pub written: AugmentedModel,
+    /// What is written for prediction alone.
+    pub predicting: Vec<PredictingTerm>,
+    /// Number of independent stretches of motion, where they are too few for anything to be written for prediction alone.
+    pub too_few_stretches: Option<usize>,
     /// The joint fit with every effect that stands.
     pub estimates: AugmentedModel,
     pub covariance: DMatrix<f64>,

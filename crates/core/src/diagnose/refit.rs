@@ -10,6 +10,8 @@ pub struct ModelProposal<'a> {
     pub model: &'a AugmentedModel,
     /// Information matrix of the unknowns beside fixed effects, in independent rows.
     pub information: &'a DMatrix<f64>,
+    /// The declared numbers stay those of the given model.
+    pub as_given: bool,
 }
 
 /// Fits the declared numbers beside the effects of a proposal, as the given model was fitted, and gives the model that

@@ -14,7 +14,7 @@ use super::problem::constant_columns::ConstantColumns;
 use super::problem::data_split::{DataSplit, LogRole};
 use super::refit::ModelRefit;
 use super::searched::SearchedCase;
-use super::steps::judge;
+use super::steps::{judge, write_for_prediction};
 use super::unexplained::dependence::{ModelResiduals, dependences};
 use super::unexplained::noise_floor::floor;
 use super::unexplained::{part_unexplained, unexplained};
@@ -43,11 +43,15 @@ pub fn diagnose(
     let judged = judge(&prepared, &searched)?;
     refuse_failed(&prepared, &judged)?;
     watch.unless_stopped()?;
-    let mut found = prepared.evaluate(&searched, judged.clone())?;
+    let with_predicting = |searched: &SearchedCase, judged: &JudgedEffects| {
+        let judged = write_for_prediction(&prepared, searched, judged.clone(), watch)?;
+        prepared.evaluate(searched, judged)
+    };
+    let mut found = with_predicting(&searched, &judged)?;
     if case.wishes.search {
         let formulas = prepared.formulas((&searched, &judged), &found, watch)?;
         if let Some((searched, judged)) = formulas.accepted {
-            found = prepared.evaluate(&searched, judged)?;
+            found = with_predicting(&searched, &judged)?;
         }
         found.formulas = formulas.formulas;
     }
@@ -79,11 +83,14 @@ impl PreparedCase<'_> {
     ) -> Result<Diagnosis, DiagnoseError> {
         let case = self.case;
         let before = self.split_errors(&case.in_use)?;
-        let refitted = self.split_errors(&self.fitted.model)?.train;
-        let after = self.split_errors(&judged.judge)?;
-        let had_a_say = judged.steps.iter().any(FoundEffect::vetoed);
-        let selected = had_a_say.then(|| self.split_errors(&judged.written));
-        let added = judged.steps.iter().any(|step| step.written.is_some());
+        let refitted = self.split_errors(&self.fitted.model)?;
+        let named = self.split_errors(&judged.named)?;
+        let is_named = judged.steps.iter().any(|step| step.written.is_some());
+        let after = match judged.predicting.is_empty() {
+            true => named.clone(),
+            false => self.split_errors(&judged.written)?,
+        };
+        let added = is_named || !judged.predicting.is_empty();
         // what is left is looked at with the numbers refitted: those that other logs gave are no missing physics
         let alone = &self.fitted.model;
         let last = if added { &judged.written } else { alone };
@@ -101,12 +108,14 @@ impl PreparedCase<'_> {
             covariance: judged.covariance,
             by_effects: judged.by_effects,
             to_estimate: judged.to_estimate,
-            steps: named(judged.steps),
+            steps: noticed(judged.steps),
+            predicting: judged.predicting,
+            too_few_stretches: judged.too_few_stretches,
             unknowns: self.unknowns.list.clone(),
             before,
             refitted,
+            named,
             after,
-            selected: selected.transpose()?,
             set_aside: self.data.split.set_aside.clone(),
             residual_std,
             fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
@@ -170,7 +179,7 @@ fn rms_of(residual: &[Vec<Vec<f64>>], split: &DataSplit) -> Vec<f64> {
 }
 
 /// Effects that change what one would notice: the others are not named.
-fn named(mut steps: Vec<FoundEffect>) -> Vec<FoundEffect> {
+fn noticed(mut steps: Vec<FoundEffect>) -> Vec<FoundEffect> {
     steps.retain(|step| step.left != Some(NotWritten::Small));
     steps
 }

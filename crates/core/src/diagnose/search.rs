@@ -153,8 +153,8 @@ impl<'a> Field<'a> {
 
     /// Sums of all fitted blocks.
     pub fn total(&self) -> Vec<DMatrix<f64>> {
-        let fitted = self.prepared.blocks.list.len();
-        self.summed.sums.over(0..fitted)
+        let sums = &self.summed.sums;
+        sums.over(0..sums.blocks.len())
     }
 
     /// The greatest admissible gain, or what says the same with fewer numbers.

@@ -15,7 +15,7 @@ use super::tables::EffectEstimates;
 use super::watch::DiagnosisWatch;
 use crate::effect::{AugmentedModel, ModelEffect};
 use crate::explain::ErrorText;
-use crate::judge::{BlockSums, compare, weighted};
+use crate::judge::{BlockSums, TimeBlock, compare, weighted};
 use crate::motion::{MotionError, Stretch};
 
 /// What the search came to.
@@ -44,6 +44,16 @@ impl PreparedCase<'_> {
         candidates: &[EffectCandidate],
         directions: &[ModelEffect],
     ) -> Result<SummedProducts, MotionError> {
+        self.summed_over(about, candidates, (directions, &self.blocks.list))
+    }
+
+    /// The same over some blocks.
+    pub fn summed_over(
+        &self,
+        about: AugmentedModel,
+        candidates: &[EffectCandidate],
+        (directions, blocks): (&[ModelEffect], &[TimeBlock]),
+    ) -> Result<SummedProducts, MotionError> {
         let layout = ColumnLayout::of(&self.unknowns, candidates);
         let mut declared = declared_terms(self.case, &self.unknowns, &layout, &about);
         declared.weights.clone_from(&self.fitted.weights);
@@ -54,7 +64,7 @@ impl PreparedCase<'_> {
             sums: BlockSums::default(),
             declared,
         };
-        summed.sums = self.passed(&summed, candidates, &self.data)?;
+        summed.sums = self.passed(&summed, candidates, (&self.data, blocks))?;
         Ok(summed)
     }
 
@@ -63,12 +73,12 @@ impl PreparedCase<'_> {
         &self,
         summed: &SummedProducts,
         candidates: &[EffectCandidate],
-        data: &WeightedRows,
+        (data, blocks): (&WeightedRows, &[TimeBlock]),
     ) -> Result<BlockSums, MotionError> {
         let mut beside = summed.about.clone();
         beside.effects.extend_from_slice(&summed.directions);
         let columns = (&self.unknowns, candidates);
-        pass(&beside, columns, &summed.layout, data, &self.blocks.list)
+        pass(&beside, columns, &summed.layout, data, blocks)
     }
 
     /// The sums with as much noise again in the positions as they have, in the mean over both signs of it.
@@ -93,7 +103,7 @@ impl PreparedCase<'_> {
                 constant: None,
                 ..self.data
             };
-            self.passed(summed, &candidates, &data)
+            self.passed(summed, &candidates, (&data, &self.blocks.list))
         };
         Ok(with(1.0)?.mean(&with(-1.0)?))
     }

@@ -15,6 +15,13 @@ use super::searched::SearchedCase;
 use super::tables::{self, EffectEstimates, VerifiedEffect};
 use crate::effect::{AugmentedModel, ModelEffect};
 
+mod harm;
+mod other_logs;
+mod predicting;
+
+use harm::HeldOutVerdict;
+pub use predicting::write_for_prediction;
+
 type StepResult<T> = Result<T, DiagnoseError>;
 
 /// One effect on its way.
@@ -54,15 +61,32 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<Jud
         prepared,
         field: prepared.field(&searched.candidates, &searched.summed),
         noisier: searched.noisier.as_ref().map(|sums| sums.over(0..fitted)),
+        logs: prepared.blocks.list.iter().map(|b| b.log).collect(),
         other_numbers: true,
     };
     let mut ways = work.ways(searched);
     work.settle(&mut ways)?;
     let mut estimates = work.readmit(&mut ways)?;
+    while let Some(harm) = work.harm_to_other_logs(&ways, &|way| work.factor(way)) {
+        ways[harm].left = Some(NotWritten::OtherLogs);
+        work.settle(&mut ways)?;
+        estimates = work.readmit(&mut ways)?;
+    }
     work.other_numbers = work.wants_other_numbers(&ways)?;
-    let judge = work.written(&ways, &estimates)?;
-    let mut written = judge.clone();
-    while let Some(harm) = work.harm(&ways, &written.1)? {
+    let mut written = work.written(&ways, &estimates)?;
+    loop {
+        let harm = match work.harm(&ways, &written.1)? {
+            HeldOutVerdict::Harmless => break,
+            HeldOutVerdict::ByEffect(harm) => harm,
+            HeldOutVerdict::ByRefit(harm) => {
+                let given = work.beside_given(&ways, &estimates)?;
+                if work.is_harmless(&given.1)? {
+                    written = given;
+                    break;
+                }
+                harm
+            }
+        };
         ways[harm].left = Some(NotWritten::HeldOut);
         work.settle(&mut ways)?;
         estimates = work.readmit(&mut ways)?;
@@ -70,7 +94,7 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<Jud
     }
     work.ask_those_that_left(&mut ways)?;
     work.held_out(&mut ways, &written.1)?;
-    Ok(work.described(&ways, &estimates, (judge.1, written)))
+    Ok(work.described(&ways, &estimates, written))
 }
 
 /// What judges the effects that were chosen: the prepared case and its field.
@@ -79,6 +103,8 @@ struct EffectJudge<'a> {
     field: Field<'a>,
     /// Sums of all blocks with as much noise again in the positions.
     noisier: Option<Vec<DMatrix<f64>>>,
+    /// Log of each fitted block.
+    logs: Vec<usize>,
     /// Whether these data want other declared numbers than those that were given.
     other_numbers: bool,
 }
@@ -139,7 +165,8 @@ impl EffectJudge<'_> {
             };
             let passes = |i: &usize| {
                 let way = &ways[*i];
-                let out = !matches!(way.left, None | Some(NotWritten::HeldOut));
+                let vetoed = matches!(way.left, Some(NotWritten::HeldOut | NotWritten::OtherLogs));
+                let out = way.left.is_some() && !vetoed;
                 out && !way.came_back && self.leaves(way).is_none()
             };
             let surest = (0..ways.len()).filter(passes);
@@ -254,12 +281,34 @@ impl EffectJudge<'_> {
             return Ok((case.given.clone(), case.in_use.clone()));
         }
         let model = self.based(self.prepared.refitted(&self.fitted(&effects))?);
-        let information = estimates.information(&self.field);
-        let in_use = (self.prepared.refit)(&ModelProposal {
-            model: &model,
-            information: &information,
-        })?;
+        let in_use = self.in_use((&model, false), estimates)?;
         Ok((model, in_use))
+    }
+
+    /// The same effects beside the declared numbers as they were given.
+    fn beside_given(
+        &self,
+        ways: &[PendingEffect],
+        estimates: &EffectEstimates,
+    ) -> StepResult<(AugmentedModel, AugmentedModel)> {
+        let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
+        let mut model = self.prepared.case.given.clone();
+        model.effects = self.fitted(&effects).effects;
+        let in_use = self.in_use((&model, true), estimates)?;
+        Ok((model, in_use))
+    }
+
+    /// A model as torques are computed with it.
+    fn in_use(
+        &self,
+        (model, as_given): (&AugmentedModel, bool),
+        estimates: &EffectEstimates,
+    ) -> StepResult<AugmentedModel> {
+        (self.prepared.refit)(&ModelProposal {
+            model,
+            information: &estimates.information(&self.field),
+            as_given,
+        })
     }
 
     /// A model with effects, its declared numbers as given but for what the effects change, unless these data want others.
@@ -302,51 +351,6 @@ impl EffectJudge<'_> {
         (self.prepared.held_out(role), given)
     }
 
-    /// The effect to take out, where the model that would be written is worse than the given one on held-out data, at a
-    /// joint or in the mean: the one whose absence helps most where it is worse.
-    fn harm(&self, ways: &[PendingEffect], written: &AugmentedModel) -> StepResult<Option<usize>> {
-        let (rows, given) = self.judging_rows();
-        let set: Vec<usize> = (0..ways.len())
-            .filter(|i| ways[*i].amplitude.is_some())
-            .collect();
-        let free = set.iter().copied().filter(|i| !ways[*i].accepted);
-        if free.clone().next().is_none() {
-            return Ok(None);
-        }
-        let noticeable = self.field.numbers().noticeable;
-        let Some(change) = rows.change([&self.prepared.case.in_use, written])? else {
-            return Ok(None);
-        };
-        let worse = (change.joints.iter()).map(|j| given && j.noticeably_worse(noticeable));
-        let worse: Vec<bool> = worse.collect();
-        if !worse.contains(&true) && change.mean[1] <= change.mean[0] {
-            return Ok(None);
-        }
-        let all: Vec<&PendingEffect> = set.iter().map(|i| &ways[*i]).collect();
-        let with = self.based(self.fitted(&all));
-        let mut most: Option<(usize, f64)> = None;
-        for i in free {
-            let others = set.iter().filter(|k| **k != i);
-            let others: Vec<&PendingEffect> = others.map(|k| &ways[*k]).collect();
-            let without = self.based(self.fitted(&others));
-            let Some(own) = rows.change([&without, &with])? else {
-                continue;
-            };
-            let at = own.joints.iter().zip(&worse).filter(|(_, worse)| **worse);
-            let cost = match worse.contains(&true) {
-                true => at.map(|(j, _)| j.after / j.before - 1.0).sum(),
-                false => own.mean[1] - own.mean[0],
-            };
-            if most.is_none_or(|(_, other)| cost > other) {
-                most = Some((i, cost));
-            }
-        }
-        // the harm of what the user wants is no reason against the others
-        let wanted = set.iter().any(|i| ways[*i].accepted);
-        let most = most.filter(|(_, cost)| *cost > 0.0 || !wanted);
-        Ok(most.map(|(i, _)| i))
-    }
-
     /// What each effect that stands changes on held-out data, the others refitted by the judge's sums.
     fn held_out(&self, ways: &mut [PendingEffect], written: &AugmentedModel) -> StepResult<()> {
         let rows = self.prepared.held_out(LogRole::Holdout);
@@ -377,7 +381,7 @@ impl EffectJudge<'_> {
         &self,
         ways: &[PendingEffect],
         estimates: &EffectEstimates,
-        (judge, (proposed, written)): (AugmentedModel, (AugmentedModel, AugmentedModel)),
+        (proposed, written): (AugmentedModel, AugmentedModel),
     ) -> JudgedEffects {
         let mut place = self.prepared.case.given.effects.len();
         let mut steps = Vec::new();
@@ -398,8 +402,10 @@ impl EffectJudge<'_> {
             to_estimate,
             steps,
             proposed,
-            judge,
+            named: written.clone(),
             written,
+            predicting: Vec::new(),
+            too_few_stretches: None,
         }
     }
 

@@ -50,7 +50,7 @@ impl EffectEstimates {
     pub fn of(field: &Field, effects: &[ChosenCandidate]) -> Result<Self, DiagnoseError> {
         let rows = field.prepared.case.prior.rows();
         let (terms, places) = with_shapes(field, effects);
-        let fitted = field.prepared.blocks.list.len();
+        let fitted = field.summed.sums.blocks.len();
         let fit = JointFit::new(&field.summed.sums, fitted, terms, rows);
         let mut fit = fit.ok_or_else(|| field.prepared.nothing_determined())?;
         if let Some(kept) = &field.prepared.case.kept {

@@ -2,7 +2,8 @@
 
 use cft_ident_core::diagnose::{
     DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisOptions, DiagnosisProgress, DiagnosisWatch,
-    FORMULA_NUMBERS, FreeParameters, LogRole, ModelProposal, ParameterPrior, diagnose,
+    FORMULA_NUMBERS, FreeParameters, LogRole, ModelProposal, PREDICTION_NUMBERS, ParameterPrior,
+    diagnose,
 };
 use cft_ident_core::effect::{AugmentedModel, ModelEffect};
 use cft_ident_core::judge::NUMBERS;
@@ -110,6 +111,7 @@ pub fn case(given: &Model, stretches: Vec<Stretch>, rest_speed: f64) -> Diagnosi
         wishes: DiagnosisOptions::default(),
         numbers: NUMBERS,
         formula: FORMULA_NUMBERS,
+        prediction: PREDICTION_NUMBERS,
         given,
     }
 }

@@ -5,6 +5,7 @@ mod data_principles;
 mod diagnosis_bench;
 mod diagnosis_formulas;
 mod diagnosis_joints;
+mod diagnosis_prediction;
 mod diagnosis_principles;
 mod effect_bench;
 mod effect_code;

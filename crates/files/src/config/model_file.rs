@@ -158,6 +158,9 @@ pub struct EffectSection {
     /// The user wanted it, whatever the data say.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub accepted_by_user: bool,
+    /// It is written because torques of other motions come out better with it, and is no statement on the machine.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub prediction_only: bool,
     /// Its numbers by key.
     #[serde(default)]
     pub parameters: BTreeMap<String, EffectParameter>,

@@ -113,6 +113,7 @@ fn model(values: &[f64]) -> ModelFile {
         effects: vec![EffectSection {
             shrinkage: None,
             accepted_by_user: false,
+            prediction_only: false,
             name: "ripple".to_owned(),
             joint: Some("q4".to_owned()),
             parameters: BTreeMap::from([

@@ -159,7 +159,7 @@ fn with_null(schema: &mut Value) {
 
 /// Name and version of a command's document.
 fn schema_of(command: &str) -> String {
-    let version = if command == "diagnose" { 3 } else { 1 };
+    let version = if command == "diagnose" { 4 } else { 1 };
     format!("cft-ident/{command}/{version}")
 }
 

@@ -29,7 +29,7 @@ use crate::open_loop::FreeRun;
 use crate::setup::{Finding, FindingKind};
 use cft_ident_core::diagnose::{
     self, DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisOptions, DiagnosisProgress,
-    DiagnosisWatch, FORMULA_NUMBERS, LogRole, ModelProposal, ParameterPrior,
+    DiagnosisWatch, FORMULA_NUMBERS, LogRole, ModelProposal, PREDICTION_NUMBERS, ParameterPrior,
 };
 use cft_ident_core::effect::{self, AugmentedModel, ModelEffect};
 use cft_ident_core::judge::NUMBERS;
@@ -276,7 +276,7 @@ pub fn diagnose(
     let by_lsq = refitting.own.is_some();
     let mut files = std::mem::take(&mut *lock(&files));
     files.retain(|(effects, _)| *effects == diagnosis.model.effects);
-    let added = diagnosis.written().next().is_some();
+    let added = diagnosis.changes_model();
     let fitted = files.pop().map(|(_, file)| file).filter(|_| added);
     in_memory.stretches = std::mem::take(&mut case.stretches);
     let logs: Vec<String> = all.iter().map(LogData::name).collect();
@@ -401,6 +401,7 @@ fn case(
         wishes: settings.wishes.clone(),
         numbers: NUMBERS,
         formula: FORMULA_NUMBERS,
+        prediction: PREDICTION_NUMBERS,
     })
 }
 

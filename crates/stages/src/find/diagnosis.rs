@@ -15,7 +15,8 @@ use crate::input::robot_setup::RobotSetup;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, SetupReport};
 use cft_ident_core::diagnose::{
-    AcceptedEffect, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
+    AcceptedEffect, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten,
+    PredictingTerm, Signal,
     SignalDependence, SplitErrors, StepStatus,
 };
 use cft_ident_core::effect::ModelEffect;
@@ -30,12 +31,16 @@ pub struct DiagnosisResult {
     pub headline: Option<HeadlineErrors>,
     /// Effects that gain on blocks left out, in the order in which they were found.
     pub steps: Vec<DiagnosisStep>,
+    /// Terms that are written because they predict, none of them sure by itself.
+    pub prediction_only: Vec<PredictionOnly>,
     /// Errors of the model as it was given.
     pub before: Option<SplitErrors>,
-    /// Errors with every effect that stood before held-out data had a say: the figure without bias.
+    /// Errors of the declared model refitted to these logs, with nothing added.
+    pub refitted: Option<SplitErrors>,
+    /// Errors of the model with what is named alone.
+    pub named: Option<SplitErrors>,
+    /// Errors of the model that is written; optimistic where held-out data had a say.
     pub after: Option<SplitErrors>,
-    /// Errors of the model that is written, where held-out data took an effect out of it: selected, and so optimistic.
-    pub written: Option<SplitErrors>,
     /// Whether held-out data took an effect out of what is written.
     pub holdout_had_a_say: bool,
     /// What the parts of the data are.
@@ -129,6 +134,30 @@ pub struct DiagnosisStep {
     pub holdout_worsened: bool,
     /// Errors on held-out data, joint by joint.
     pub joints: Vec<JointChange>,
+}
+
+/// A term that is written for prediction alone.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct PredictionOnly {
+    pub effect: &'static str,
+    /// Null for what concerns all joints.
+    pub joint: Option<String>,
+    /// Its numbers in the model that is written, by key.
+    #[serde(serialize_with = "by_key")]
+    #[schemars(with = "BTreeMap<String, EffectValueFound>")]
+    pub parameters: Vec<(String, EffectValueFound)>,
+    /// Part of the fitted amplitude that is written, 0..1: the rest may be chance.
+    pub shrinkage: f64,
+    /// How many deviations one number would have to be off zero to be as sure.
+    pub deviations: f64,
+    /// Root mean square of its whole torque at the joint where it is strongest.
+    pub torque: EffectValueFound,
+    /// Gain on blocks left out, joint by joint: squared error in units of the joint's residual variance.
+    pub gain: Vec<JointGain>,
+    /// Root mean square torque error of its joint on held-out data without it, the others kept and refitted.
+    pub holdout_before: Option<f64>,
+    /// The same with it.
+    pub holdout_after: Option<f64>,
 }
 
 /// How the data were divided.
@@ -234,9 +263,11 @@ impl DataFault {
             verdict: DiagnosisVerdict::DataFault,
             headline: None,
             steps: Vec::new(),
+            prediction_only: Vec::new(),
             before: None,
+            refitted: None,
+            named: None,
             after: None,
-            written: None,
             holdout_had_a_say: false,
             blocks: None,
             free_run: None,
@@ -268,7 +299,7 @@ impl Diagnosed {
 
     /// The errors that count.
     fn headline(&self) -> HeadlineErrors {
-        let (before, after) = (&self.diagnosis.before, self.diagnosis.errors_now());
+        let (before, after) = (&self.diagnosis.before, &self.diagnosis.after);
         let of = |errors: &SplitErrors| {
             let counted = errors.holdout.as_ref().unwrap_or(&errors.train);
             counted.overall.mean_relative_error_moving
@@ -313,9 +344,11 @@ impl Diagnosed {
             verdict: self.verdict(),
             headline: Some(self.headline()),
             steps: d.steps.iter().map(|s| self.step(setup, s)).collect(),
+            prediction_only: self.prediction_only(setup),
             before: Some(d.before.clone()),
+            refitted: Some(d.refitted.clone()),
+            named: Some(d.named.clone()),
             after: Some(d.after.clone()),
-            written: d.selected.clone(),
             holdout_had_a_say: d.holdout_had_a_say(),
             blocks: Some(BlocksResult {
                 count: d.blocks,
@@ -341,6 +374,30 @@ impl Diagnosed {
             faults: Vec::new(),
             setup: Vec::new(),
         }
+    }
+
+    fn prediction_only(&self, setup: &RobotSetup) -> Vec<PredictionOnly> {
+        let of_term = |term: &PredictingTerm| {
+            let effect = &self.diagnosis.model.effects[term.written];
+            let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+            PredictionOnly {
+                effect: effect.name(),
+                joint: effect.place.name(&setup.robot),
+                parameters: values_found(effect.numbers(&setup.robot, unit, None)).collect(),
+                shrinkage: term.shrinkage,
+                deviations: term.deviations,
+                torque: EffectValueFound {
+                    value: term.torque[0],
+                    std: Some(term.torque[1]),
+                    unit: unit.to_owned(),
+                    bound: false,
+                },
+                gain: gain_of_each(setup.robot.joint_names(), &term.gain),
+                holdout_before: term.held_out.map(|h| h[0]),
+                holdout_after: term.held_out.map(|h| h[1]),
+            }
+        };
+        self.diagnosis.predicting.iter().map(of_term).collect()
     }
 
     fn step(&self, setup: &RobotSetup, step: &FoundEffect) -> DiagnosisStep {
@@ -422,6 +479,9 @@ fn found_candidate(setup: &RobotSetup, step: &FoundEffect) -> CandidateResult {
     let reason = match step.left {
         None => "",
         Some(NotWritten::HeldOut) => "held-out data are worse with it",
+        Some(NotWritten::OtherLogs) => {
+            "a log that is left out is worse predicted with it by the others"
+        }
         Some(NotWritten::Bound) => "a bound of its numbers takes all of it beside the others",
         Some(NotWritten::Small) => "it changes no error that one would notice",
         Some(NotWritten::Unsure) => "its amplitude is too uncertain",

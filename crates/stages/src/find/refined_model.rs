@@ -13,7 +13,7 @@ use cft_ident_core::motion::Stretch;
 use cft_ident_core::verdict::{Verdict, verdict_of};
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::candidates::CandidateSection;
-use cft_ident_files::config::model_file::{Covariance, Estimate, Parameter};
+use cft_ident_files::config::model_file::{Covariance, EffectSection, Estimate, Parameter};
 use cft_ident_logs::log::DataRole;
 
 impl Diagnosed {
@@ -27,7 +27,7 @@ impl Diagnosed {
             return Ok(None);
         }
         let before = refined(given, name)?;
-        let added = self.diagnosis.written().next().is_some();
+        let added = self.diagnosis.changes_model();
         let after = added.then_some(&self.diagnosis.in_use);
         let stretches = &self.in_memory.stretches;
         let spans = self.held_out_spans();
@@ -210,10 +210,11 @@ impl Diagnosed {
     fn is_whole(&self) -> bool {
         let model = &self.diagnosis.model;
         let mut written = self.diagnosis.written();
-        written.all(|s| {
-            s.written
-                .is_some_and(|at| model.effects[at].linear == s.estimate.linear)
-        })
+        self.diagnosis.predicting.is_empty()
+            && written.all(|s| {
+                s.written
+                    .is_some_and(|at| model.effects[at].linear == s.estimate.linear)
+            })
     }
 
     /// Effects that the given model had, and those that were found.
@@ -248,6 +249,16 @@ impl Diagnosed {
                 }));
             }
             model.effects.push(section);
+        }
+        for term in &self.diagnosis.predicting {
+            let effect = &self.diagnosis.model.effects[term.written];
+            let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+            let numbers = effect.numbers(&setup.robot, unit, None);
+            model.effects.push(EffectSection {
+                shrinkage: Some(term.shrinkage),
+                prediction_only: true,
+                ..in_file(effect, setup, &numbers)
+            });
         }
     }
 }

@@ -83,6 +83,7 @@ impl OwnRefit<'_> {
     /// The model file of a proposal, without its effects.
     pub fn file(&self, proposal: &ModelProposal) -> Result<ModelFile, IdentifyError> {
         match &self.own {
+            _ if proposal.as_given => Ok(self.given.file.clone()),
             Some(own) => self.by_lsq(own, proposal.model),
             None => Ok(self.by_sums(proposal)),
         }

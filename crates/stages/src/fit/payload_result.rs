@@ -145,6 +145,7 @@ impl PayloadReading {
         EffectSection {
             shrinkage: None,
             accepted_by_user: false,
+            prediction_only: false,
             name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
             joint: None,
             parameters,

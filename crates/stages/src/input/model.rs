@@ -93,6 +93,7 @@ pub(crate) fn in_file(
         joint: effect.place.name(&setup.robot),
         shrinkage: None,
         accepted_by_user: false,
+        prediction_only: false,
         parameters: numbers
             .iter()
             .map(|t| {

@@ -151,7 +151,7 @@ impl ReplayedDiagnosis {
         let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
         let shown = if others.is_empty() { fitted } else { others };
         // without an effect the given model stands
-        let after = d.written().next().map(|_| &d.in_use);
+        let after = d.changes_model().then_some(&d.in_use);
         let models: Vec<&AugmentedModel> = [&found.given].into_iter().chain(after).collect();
         let added = d
             .written()

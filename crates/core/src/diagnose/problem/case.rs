@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 
 use super::data_split::{DataSplit, LogRole};
 use super::formula_numbers::FormulaNumbers;
+use super::prediction_numbers::PredictionNumbers;
 use super::prior::ParameterPrior;
 use super::unknowns::{DiagnosisUnknowns, FreeParameters};
 use crate::effect::{AugmentedModel, Law, ModelEffect, ShapeSearch};
@@ -46,6 +47,8 @@ pub struct DiagnosisCase {
     pub numbers: Numbers,
     /// What decides on formulas.
     pub formula: FormulaNumbers,
+    /// What decides on terms that are written for prediction alone.
+    pub prediction: PredictionNumbers,
 }
 
 /// An effect that is written whatever the judge says.
@@ -132,6 +135,8 @@ pub struct DiagnosisOptions {
     pub accepted: Vec<AcceptedEffect>,
     /// A formula of what is left is looked for.
     pub search: bool,
+    /// Nothing is written for prediction alone.
+    pub named_only: bool,
 }
 
 impl DiagnosisOptions {

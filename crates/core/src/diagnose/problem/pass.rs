@@ -95,6 +95,7 @@ impl EffectCandidate {
 }
 
 /// Where the columns of unknowns and candidates stand in the rows of each joint.
+#[derive(Clone)]
 pub struct ColumnLayout {
     pub declared: Vec<Term>,
     /// Terms of what is held.

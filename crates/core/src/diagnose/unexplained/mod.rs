@@ -5,7 +5,7 @@ pub mod errors;
 pub mod evidence;
 pub mod map;
 pub mod noise_floor;
-mod period;
+pub mod period;
 pub mod signal;
 
 use self::errors::{JointErrors, UseErrors};

@@ -260,6 +260,7 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> EffectSec
     EffectSection {
         shrinkage: None,
         accepted_by_user: false,
+        prediction_only: false,
         name: name.to_owned(),
         joint: joint.map(str::to_owned),
         parameters: numbers.iter().map(number).collect(),

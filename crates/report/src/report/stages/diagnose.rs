@@ -114,6 +114,7 @@ pub(super) fn diagnosed(
     for (i, step) in d.steps.iter().enumerate() {
         numbered(&mut detail, setup, (i + 1, step));
     }
+    found_effects::prediction_only(&mut detail, setup, d);
     free_run::section(&mut detail, found.free_run.as_ref());
     detail.list(doubts(setup, found));
     let changes = changes(setup, found);
@@ -129,8 +130,8 @@ pub(super) fn diagnosed(
 /// Errors joint by joint, those of a screen.
 fn in_short(usual: &mut Writer, setup: &RobotSetup, d: &Diagnosis) {
     let (_, before) = errors_of(&d.before);
-    let (data, after) = errors_of(d.errors_now());
-    let changed = d.written().next().is_some();
+    let (data, after) = errors_of(&d.after);
+    let changed = d.changes_model();
     let hundred = number::hundredths;
     let relative: Vec<f64> = after.joints.iter().map(|e| e.headline()).collect();
     let (joints, more) = summary::most_wrong(&relative);
@@ -223,7 +224,7 @@ fn before_and_after(setup: &RobotSetup, d: &Diagnosis) -> Table {
         Some(errors) => hundred(errors.joints[j].headline()),
         None => number::ABSENT.to_owned(),
     };
-    let (names, now) = (setup.robot.joint_names(), d.errors_now());
+    let (names, now) = (setup.robot.joint_names(), &d.after);
     Columns::new(caption, 0..names.len())
         .words("joint", |j| &names[j])
         .numbers("fitted", |j| fitted(&d.before, j))
@@ -253,7 +254,7 @@ fn doubts(setup: &RobotSetup, found: &Diagnosed) -> Vec<String> {
     });
     let open = listed(open);
     let mut out = Vec::new();
-    if let Some(share) = explained(d).filter(|_| d.written().next().is_some()) {
+    if let Some(share) = explained(d).filter(|_| d.changes_model()) {
         out.push(format!(
             "what is written explains {} of the residual power above the noise",
             number::percent(share)
@@ -295,7 +296,7 @@ pub(super) fn sections(
     found_effects::show(page, setup, found, replayed);
     page.list(d.steps.iter().filter_map(|step| seen(setup, step)));
     page.list(changes(setup, found));
-    let errors = errors_of(d.errors_now()).1.joints.iter();
+    let errors = errors_of(&d.after).1.joints.iter();
     let errors = errors.map(|e| e.headline());
     sketch::section(page, setup, replayed.poses.as_ref(), errors);
     let drawn = |name: &'static str, styles| TorqueDrawing {
@@ -304,9 +305,9 @@ pub(super) fn sections(
     };
     let before = drawn("before", [TraceStyle::Before, TraceStyle::Before]);
     let after = drawn("after", [TraceStyle::Model, TraceStyle::After]);
-    let models = match d.written().next() {
-        None => vec![torque::ONLY],
-        Some(_) => vec![before, after],
+    let models = match d.changes_model() {
+        false => vec![torque::ONLY],
+        true => vec![before, after],
     };
     let title = replayed.logs.join(", ");
     torque::section(page, setup, &replayed.torque, &models, &title);
@@ -343,10 +344,10 @@ fn candidates(page: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
 /// Errors of every joint on fitted and held-out logs; before and after where another model is written.
 pub(super) fn errors(page: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
     let d = &found.diagnosis;
-    let now = d.errors_now();
-    let sides: Vec<(&str, &SplitErrors)> = match d.written().next() {
-        Some(_) => vec![(", before", &d.before), (", after", now)],
-        None => vec![("", now)],
+    let now = &d.after;
+    let sides: Vec<(&str, &SplitErrors)> = match d.changes_model() {
+        true => vec![(", before", &d.before), (", after", now)],
+        false => vec![("", now)],
     };
     let names = setup.robot.joint_names();
     let percent = |e: &UseErrors, j: usize| number::percent(e.joints[j].headline());

@@ -59,6 +59,8 @@ pub(super) fn words(setup: &RobotSetup, found: &Diagnosed) -> DiagnosisWords {
                 .to_owned(),
         )),
     }
+    all.extend(for_prediction(d));
+    all.extend(too_few_stretches(d));
     all.extend(taken_out(setup, d));
     all.extend(most_is_left(setup, d).map(|text| said("remaining", text)));
     let worse = runs_worse(found);
@@ -77,10 +79,10 @@ pub(super) fn words(setup: &RobotSetup, found: &Diagnosed) -> DiagnosisWords {
 
 /// Error before, error after and what is usual.
 fn headline(setup: &RobotSetup, d: &Diagnosis) -> VerdictHeadline {
-    let ((data, before), (_, after)) = (errors(&d.before), errors(d.errors_now()));
+    let ((data, before), (_, after)) = (errors(&d.before), errors(&d.after));
     let mean = |e: &UseErrors| e.overall.mean_relative_error_moving;
     let [from, to] = [before, after].map(|e| number::percent(mean(e)));
-    let changed = d.written().next().is_some();
+    let changed = d.changes_model();
     let torque_is = setup.file.log.torque_is;
     let unusual = mean(after) > usual::band(torque_is)[1];
     let tone = match changed {
@@ -99,7 +101,7 @@ fn headline(setup: &RobotSetup, d: &Diagnosis) -> VerdictHeadline {
         1 => String::new(),
         n => format!(", rms over {n} joints"),
     };
-    let optimistic = d.selected.is_some() && changed;
+    let optimistic = d.holdout_had_a_say() && changed;
     let chosen = if optimistic {
         "; optimistic, since these data chose the effects"
     } else {
@@ -125,7 +127,7 @@ fn runs_worse(found: &Diagnosed) -> String {
 /// Whether the error is so small that no published figure is of use beside it.
 pub(super) fn is_exact(d: &Diagnosis) -> bool {
     let [least, _] = usual::band(None);
-    errors(d.errors_now()).1.overall.mean_relative_error_moving < 0.5 * least
+    errors(&d.after).1.overall.mean_relative_error_moving < 0.5 * least
 }
 
 /// The effects, by how firm they are, and what of them is written.
@@ -168,19 +170,52 @@ pub(super) fn errors(of: &SplitErrors) -> (&'static str, &UseErrors) {
     }
 }
 
-/// The effects that held-out data took out of the model.
-fn taken_out(setup: &RobotSetup, d: &Diagnosis) -> Option<FoundLine> {
-    d.selected.as_ref()?;
-    let vetoed = d.steps.iter().filter(|s| s.vetoed());
-    let names: Vec<String> = vetoed.map(|s| titled(setup, &s.estimate)).collect();
-    let error = |of: &SplitErrors| number::percent(errors(of).1.overall.mean_relative_error_moving);
-    let of = match d.written().next() {
-        None => format!(" ({})", error(&d.after)),
-        Some(_) => String::new(),
+/// What is written for prediction alone, counted by law, the error with what is named beside it.
+fn for_prediction(d: &Diagnosis) -> Option<FoundLine> {
+    let mut laws: Vec<(&str, usize)> = Vec::new();
+    for term in &d.predicting {
+        let name = term.estimate.name();
+        match laws.iter_mut().find(|(law, _)| *law == name) {
+            Some((_, count)) => *count += 1,
+            None => laws.push((name, 1)),
+        }
+    }
+    laws.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let counted = listed(laws.iter().map(|(law, count)| format!("{count} {law}")));
+    let named = number::percent(errors(&d.named).1.overall.mean_relative_error_moving);
+    let terms = match d.predicting.len() {
+        0 => return None,
+        1 => "1 term".to_owned(),
+        n => format!("{n} terms"),
     };
     Some(FoundLine {
+        grade: "prediction",
+        text: format!(
+            "written for prediction only: {terms} ({counted}), none of them sure by itself; without them the error \
+             is {named} (--named-only)"
+        ),
+    })
+}
+
+/// Why nothing is written for prediction alone where one motion repeats, and what to log.
+fn too_few_stretches(d: &Diagnosis) -> Option<FoundLine> {
+    let count = d.too_few_stretches.filter(|_| d.long_enough())?;
+    Some(FoundLine {
+        grade: "one motion",
+        text: format!(
+            "these logs repeat one motion of {count} independent stretches, and nothing is written for prediction \
+             only: log a longer motion, or several"
+        ),
+    })
+}
+
+/// The effects that held-out data took out of the model.
+fn taken_out(setup: &RobotSetup, d: &Diagnosis) -> Option<FoundLine> {
+    let vetoed = d.steps.iter().filter(|s| s.vetoed());
+    let names: Vec<String> = vetoed.map(|s| titled(setup, &s.estimate)).collect();
+    (!names.is_empty()).then(|| FoundLine {
         grade: "not written",
-        text: format!("{}: the held-out error rises with it{of}", names.join("; ")),
+        text: format!("{}: the held-out error rises with it", names.join("; ")),
     })
 }
 
@@ -197,7 +232,7 @@ pub(super) fn worst(d: &Diagnosis) -> Option<usize> {
 fn most_is_left(setup: &RobotSetup, d: &Diagnosis) -> Option<String> {
     let names = setup.robot.joint_names();
     let worst = worst(d)?;
-    let error = number::percent(errors(d.errors_now()).1.joints[worst].headline());
+    let error = number::percent(errors(&d.after).1.joints[worst].headline());
     let place = match names.len() {
         1 => format!("a residual with a pattern ({error} of the torque)"),
         _ => format!(

@@ -42,7 +42,7 @@ fn bars(setup: &RobotSetup, found: &Diagnosed) -> ErrorFigure {
         Some(_) => "held-out data",
         None => "the fitted data",
     };
-    let errors = [&d.before, d.errors_now()].map(|split| errors_of(split).1);
+    let errors = [&d.before, &d.after].map(|split| errors_of(split).1);
     let bar = |errors: &UseErrors, j: usize| ErrorBar {
         error: errors.joints[j].headline(),
         interval_95: Some(errors.joints[j].interval_95),
@@ -50,7 +50,7 @@ fn bars(setup: &RobotSetup, found: &Diagnosed) -> ErrorFigure {
     let joints = setup.robot.joint_names().iter().enumerate();
     let joints = joints.map(|(j, joint)| JointBars {
         joint: joint.clone(),
-        before: d.written().next().map(|_| bar(errors[0], j)),
+        before: d.changes_model().then(|| bar(errors[0], j)),
         after: bar(errors[1], j),
     });
     ErrorFigure {
@@ -137,7 +137,7 @@ fn next(
         Some(joint) => alone(format!(
             "Next: look at the residual of {joint} in the report, and log it at other speeds and loads."
         )),
-        None if d.written().next().is_none() => (
+        None if !d.changes_model() => (
             "Next: use the model:".to_owned(),
             Some(format!("cft-ident export -m {path} --c model.h")),
         ),
