@@ -84,6 +84,7 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<Jud
                     written = given;
                     break;
                 }
+                let Some(harm) = harm else { break };
                 harm
             }
         };

@@ -11,12 +11,12 @@ use super::formulas::{
     values_found,
 };
 use super::next_motion::separating_command;
+use super::prediction_only::PredictionOnly;
 use crate::input::robot_setup::RobotSetup;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, SetupReport};
 use cft_ident_core::diagnose::{
-    AcceptedEffect, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten,
-    PredictingTerm, Signal,
+    AcceptedEffect, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
     SignalDependence, SplitErrors, StepStatus,
 };
 use cft_ident_core::effect::ModelEffect;
@@ -136,30 +136,6 @@ pub struct DiagnosisStep {
     pub joints: Vec<JointChange>,
 }
 
-/// A term that is written for prediction alone.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct PredictionOnly {
-    pub effect: &'static str,
-    /// Null for what concerns all joints.
-    pub joint: Option<String>,
-    /// Its numbers in the model that is written, by key.
-    #[serde(serialize_with = "by_key")]
-    #[schemars(with = "BTreeMap<String, EffectValueFound>")]
-    pub parameters: Vec<(String, EffectValueFound)>,
-    /// Part of the fitted amplitude that is written, 0..1: the rest may be chance.
-    pub shrinkage: f64,
-    /// How many deviations one number would have to be off zero to be as sure.
-    pub deviations: f64,
-    /// Root mean square of its whole torque at the joint where it is strongest.
-    pub torque: EffectValueFound,
-    /// Gain on blocks left out, joint by joint: squared error in units of the joint's residual variance.
-    pub gain: Vec<JointGain>,
-    /// Root mean square torque error of its joint on held-out data without it, the others kept and refitted.
-    pub holdout_before: Option<f64>,
-    /// The same with it.
-    pub holdout_after: Option<f64>,
-}
-
 /// How the data were divided.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct BlocksResult {
@@ -232,7 +208,7 @@ pub struct BlockAside {
 }
 
 /// A list of keys and values as a map, in its order.
-fn by_key<S: Serializer, T: Serialize>(
+pub(super) fn by_key<S: Serializer, T: Serialize>(
     list: &[(String, T)],
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
@@ -374,30 +350,6 @@ impl Diagnosed {
             faults: Vec::new(),
             setup: Vec::new(),
         }
-    }
-
-    fn prediction_only(&self, setup: &RobotSetup) -> Vec<PredictionOnly> {
-        let of_term = |term: &PredictingTerm| {
-            let effect = &self.diagnosis.model.effects[term.written];
-            let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
-            PredictionOnly {
-                effect: effect.name(),
-                joint: effect.place.name(&setup.robot),
-                parameters: values_found(effect.numbers(&setup.robot, unit, None)).collect(),
-                shrinkage: term.shrinkage,
-                deviations: term.deviations,
-                torque: EffectValueFound {
-                    value: term.torque[0],
-                    std: Some(term.torque[1]),
-                    unit: unit.to_owned(),
-                    bound: false,
-                },
-                gain: gain_of_each(setup.robot.joint_names(), &term.gain),
-                holdout_before: term.held_out.map(|h| h[0]),
-                holdout_after: term.held_out.map(|h| h[1]),
-            }
-        };
-        self.diagnosis.predicting.iter().map(of_term).collect()
     }
 
     fn step(&self, setup: &RobotSetup, step: &FoundEffect) -> DiagnosisStep {

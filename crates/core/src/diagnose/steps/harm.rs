@@ -12,9 +12,9 @@ pub(super) enum HeldOutVerdict {
     Harmless,
     /// The absence of this effect mends most of the joints that are worse.
     ByEffect(usize),
-    /// Joints are worse, and no effect by itself is why: the refit of the declared numbers is. The effect whose absence
-    /// mends most of it, were they all to stay as they are.
-    ByRefit(usize),
+    /// Joints are worse, and no effect by itself is why: the refit of the declared numbers is. What leaves where the given
+    /// numbers are no better beside the effects: that whose absence costs least, unless what the user wants is to blame.
+    ByRefit(Option<usize>),
 }
 
 impl EffectJudge<'_> {
@@ -65,7 +65,11 @@ impl EffectJudge<'_> {
         }
         Ok(match mends {
             true => HeldOutVerdict::ByEffect(most.0),
-            false => HeldOutVerdict::ByRefit(most.0),
+            false => {
+                // the harm of what the user wants is no reason against the others
+                let wanted = set.iter().any(|i| ways[*i].accepted);
+                HeldOutVerdict::ByRefit((most.1 > 0.0 || !wanted).then_some(most.0))
+            }
         })
     }
 
