@@ -217,8 +217,8 @@ pub fn no_finding(
     effect.broken(&seen, &told).map(|(_, why)| why)
 }
 
-/// The size of an effect that is a torque greater than `most`, the greatest that the joint took, with that: only the others in the fit can
-/// hold against it. What hangs on the pose may be greater at poses that were not seen.
+/// The size of an effect that is a torque greater than `most`, the greatest that the joint took, with that: only the
+/// others in the fit can hold against it. What hangs on the pose may be greater at poses that were not seen.
 fn beyond_the_joint(effect: &ModelEffect, most: f64) -> Option<(&'static str, f64)> {
     let entry = effect.law.entry;
     let by_pose = effect.family() == Family::Position && entry.search != ShapeSearch::Orders;
