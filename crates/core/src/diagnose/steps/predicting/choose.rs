@@ -88,6 +88,7 @@ impl Field<'_> {
                 gain: a.gain.clone(),
                 error: left_out.error(),
                 alternatives: Vec::new(),
+                accepted: false,
             }));
         }
         Ok(chosen)
