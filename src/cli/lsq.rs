@@ -86,6 +86,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let settings = LsqSettings {
         estimator: args.estimator,
         consistent: !args.unconstrained && args.open_loop.is_none(),
+        consistent_whatever: false,
         friction: friction.as_ref().map(|model| &model.value),
         hold_friction: args.hold_friction,
         open_loop: args.open_loop,

@@ -39,8 +39,6 @@ pub enum NotWritten {
     Small,
     /// Held-out data are worse with it.
     HeldOut,
-    /// One of the fitted logs, left out, is worse predicted with it by the others.
-    OtherLogs,
 }
 
 /// One effect that gained on blocks left out.

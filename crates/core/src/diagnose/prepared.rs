@@ -37,6 +37,7 @@ pub struct PreparedCase<'a> {
 }
 
 /// Sums of products about a model.
+#[derive(Clone)]
 pub struct SummedProducts {
     /// The declared model that they are about.
     pub about: AugmentedModel,

@@ -16,7 +16,6 @@ use super::tables::{self, EffectEstimates, VerifiedEffect};
 use crate::effect::{AugmentedModel, ModelEffect};
 
 mod harm;
-mod other_logs;
 mod predicting;
 
 use harm::HeldOutVerdict;
@@ -61,17 +60,11 @@ pub fn judge(prepared: &PreparedCase, searched: &SearchedCase) -> StepResult<Jud
         prepared,
         field: prepared.field(&searched.candidates, &searched.summed),
         noisier: searched.noisier.as_ref().map(|sums| sums.over(0..fitted)),
-        logs: prepared.blocks.list.iter().map(|b| b.log).collect(),
         other_numbers: true,
     };
     let mut ways = work.ways(searched);
     work.settle(&mut ways)?;
     let mut estimates = work.readmit(&mut ways)?;
-    while let Some(harm) = work.harm_to_other_logs(&ways, &|way| work.factor(way)) {
-        ways[harm].left = Some(NotWritten::OtherLogs);
-        work.settle(&mut ways)?;
-        estimates = work.readmit(&mut ways)?;
-    }
     work.other_numbers = work.wants_other_numbers(&ways)?;
     let mut written = work.written(&ways, &estimates)?;
     loop {
@@ -104,8 +97,6 @@ struct EffectJudge<'a> {
     field: Field<'a>,
     /// Sums of all blocks with as much noise again in the positions.
     noisier: Option<Vec<DMatrix<f64>>>,
-    /// Log of each fitted block.
-    logs: Vec<usize>,
     /// Whether these data want other declared numbers than those that were given.
     other_numbers: bool,
 }
@@ -166,8 +157,7 @@ impl EffectJudge<'_> {
             };
             let passes = |i: &usize| {
                 let way = &ways[*i];
-                let vetoed = matches!(way.left, Some(NotWritten::HeldOut | NotWritten::OtherLogs));
-                let out = way.left.is_some() && !vetoed;
+                let out = !matches!(way.left, None | Some(NotWritten::HeldOut));
                 out && !way.came_back && self.leaves(way).is_none()
             };
             let surest = (0..ways.len()).filter(passes);
@@ -282,7 +272,7 @@ impl EffectJudge<'_> {
             return Ok((case.given.clone(), case.in_use.clone()));
         }
         let model = self.based(self.prepared.refitted(&self.fitted(&effects))?);
-        let in_use = self.in_use((&model, false), estimates)?;
+        let in_use = self.in_use((&model, None), estimates)?;
         Ok((model, in_use))
     }
 
@@ -295,20 +285,21 @@ impl EffectJudge<'_> {
         let effects: Vec<_> = ways.iter().filter(|w| w.amplitude.is_some()).collect();
         let mut model = self.prepared.case.given.clone();
         model.effects = self.fitted(&effects).effects;
-        let in_use = self.in_use((&model, true), estimates)?;
+        let given = &self.prepared.case.given.effects;
+        let in_use = self.in_use((&model, Some(given)), estimates)?;
         Ok((model, in_use))
     }
 
     /// A model as torques are computed with it.
     fn in_use(
         &self,
-        (model, as_given): (&AugmentedModel, bool),
+        (model, numbers_of): (&AugmentedModel, Option<&[ModelEffect]>),
         estimates: &EffectEstimates,
     ) -> StepResult<AugmentedModel> {
         (self.prepared.refit)(&ModelProposal {
             model,
             information: &estimates.information(&self.field),
-            as_given,
+            numbers_of,
         })
     }
 

@@ -55,23 +55,6 @@ impl BlockSums {
         all
     }
 
-    /// For each log, in the order of `logs` of the blocks, the blocks of the others and its own.
-    pub(crate) fn by_log(&self, logs: &[usize]) -> Vec<(Self, Self)> {
-        let mut each: Vec<usize> = logs.to_vec();
-        each.sort_unstable();
-        each.dedup();
-        let some = |wanted: &dyn Fn(usize) -> bool| {
-            let own =
-                || (0..self.blocks.len()).filter(|b| logs.get(*b).is_some_and(|log| wanted(*log)));
-            Self {
-                blocks: own().map(|b| self.blocks[b].clone()).collect(),
-                rows: own().map(|b| self.rows[b].clone()).collect(),
-            }
-        };
-        let of_log = |log: &usize| (some(&|other| other != *log), some(&|other| other == *log));
-        each.iter().map(of_log).collect()
-    }
-
     /// The sum over some blocks, joint by joint.
     pub fn over(&self, blocks: impl Iterator<Item = usize>) -> Vec<DMatrix<f64>> {
         let mut total: Vec<DMatrix<f64>> = Vec::new();

@@ -31,7 +31,7 @@ use cft_ident_core::diagnose::{
     self, DiagnoseError, Diagnosis, DiagnosisCase, DiagnosisOptions, DiagnosisProgress,
     DiagnosisWatch, FORMULA_NUMBERS, LogRole, ModelProposal, PREDICTION_NUMBERS, ParameterPrior,
 };
-use cft_ident_core::effect::{self, AugmentedModel, ModelEffect};
+use cft_ident_core::effect::{self, AugmentedModel};
 use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::motion::ParallelFilters;
 use cft_ident_core::robot::drive::JointDrive;
@@ -251,13 +251,22 @@ pub fn diagnose(
         own,
         control: control.clone(),
     };
-    let files: Mutex<Vec<(Vec<ModelEffect>, ModelFile)>> = Mutex::default();
+    let files: Mutex<Vec<(AugmentedModel, ModelFile)>> = Mutex::default();
     let failed: Mutex<Option<IdentifyError>> = Mutex::default();
     let refit = |proposal: &ModelProposal| {
-        let made = refitting.file(proposal).and_then(|file| {
+        let made = match proposal.numbers_of {
+            Some(effects) => {
+                let files = lock(&files);
+                let base = files.iter().rfind(|(model, _)| model.effects == effects);
+                let base = base.map_or((&case.given, as_given), |(model, file)| (model, file));
+                Ok(refitting.moved(base, proposal.model))
+            }
+            None => refitting.file(proposal),
+        };
+        let made = made.and_then(|file| {
             let mut in_use = refined(&file, name)?;
             in_use.effects.clone_from(&proposal.model.effects);
-            lock(&files).push((proposal.model.effects.clone(), file));
+            lock(&files).push((proposal.model.clone(), file));
             Ok(in_use)
         });
         made.map_err(|error| {
@@ -275,7 +284,7 @@ pub fn diagnose(
     };
     let by_lsq = refitting.own.is_some();
     let mut files = std::mem::take(&mut *lock(&files));
-    files.retain(|(effects, _)| *effects == diagnosis.model.effects);
+    files.retain(|(model, _)| model.effects == diagnosis.model.effects);
     let added = diagnosis.changes_model();
     let fitted = files.pop().map(|(_, file)| file).filter(|_| added);
     in_memory.stretches = std::mem::take(&mut case.stretches);

@@ -431,9 +431,6 @@ fn found_candidate(setup: &RobotSetup, step: &FoundEffect) -> CandidateResult {
     let reason = match step.left {
         None => "",
         Some(NotWritten::HeldOut) => "held-out data are worse with it",
-        Some(NotWritten::OtherLogs) => {
-            "a log that is left out is worse predicted with it by the others"
-        }
         Some(NotWritten::Bound) => "a bound of its numbers takes all of it beside the others",
         Some(NotWritten::Small) => "it changes no error that one would notice",
         Some(NotWritten::Unsure) => "its amplitude is too uncertain",

@@ -165,13 +165,14 @@ fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColum
 }
 
 /// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached. None where the
-/// search failed or left the finite.
+/// search failed or left the finite. They are in use `whatever` the plain fit gains, or where it gains nothing.
 pub(crate) fn consistent(
     setup: &RobotSetup,
     estimated: &InertialEstimate,
     fastest: &[f64],
+    whatever: bool,
 ) -> Option<ConsistentLinks> {
-    let found = nearest_consistent(setup, estimated, fastest).ok()?;
+    let found = nearest_consistent(setup, estimated, fastest, whatever).ok()?;
     let numbers = found.values.iter().chain(&found.growth);
     numbers.clone().all(|x| x.is_finite()).then_some(found)
 }
@@ -180,6 +181,7 @@ fn nearest_consistent(
     setup: &RobotSetup,
     estimated: &InertialEstimate,
     fastest: &[f64],
+    whatever: bool,
 ) -> Result<ConsistentLinks, IdentifyError> {
     let map = setup.robot.standard_map();
     let bodies = bodies(&setup.file, &map);
@@ -201,9 +203,8 @@ fn nearest_consistent(
     };
     let found = feasible(&task)?;
     // parts that determine no fit by themselves are not tried
-    let tried = left_out(&basis.sums, &basis.parts, &weights, &task)
-        .ok()
-        .flatten();
+    let trial = || left_out(&basis.sums, &basis.parts, &weights, &task).ok()?;
+    let tried = (!whatever).then(trial).flatten();
     let bound = residual_of(&basis.sums, &found.theta)?;
     let growth = |(free, bound): (&f64, &f64)| if *free > 0.0 { bound / free } else { 1.0 };
     let growth: Vec<f64> = free.iter().zip(&bound).map(growth).collect();

@@ -52,7 +52,12 @@ impl JudgedEstimate {
         // in amperes nothing says what a body can be
         let asked = problem.settings.consistent && is_in_si(setup);
         let consistent = match asked {
-            true => consistent(setup, &estimate, &problem.data.top_speeds()?),
+            true => consistent(
+                setup,
+                &estimate,
+                &problem.data.top_speeds()?,
+                problem.settings.consistent_whatever,
+            ),
             false => None,
         };
         estimate.take_bias_off(consistent.as_ref());

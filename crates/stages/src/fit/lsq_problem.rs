@@ -26,6 +26,8 @@ pub struct LsqSettings<'a> {
     pub estimator: EstimatorKind,
     /// Physically consistent parameters beside those of the plain fit.
     pub consistent: bool,
+    /// They are in use whatever the plain fit gains on blocks left out, for the fit is made again as a model was made.
+    pub consistent_whatever: bool,
     /// The model that holds the friction of every joint; without one, friction is fitted together with the inertias.
     pub friction: Option<&'a GivenModel>,
     /// The friction of `friction` stays as it is; otherwise it is refined with the inertias, but for `ols`.

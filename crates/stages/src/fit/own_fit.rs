@@ -83,7 +83,6 @@ impl OwnRefit<'_> {
     /// The model file of a proposal, without its effects.
     pub fn file(&self, proposal: &ModelProposal) -> Result<ModelFile, IdentifyError> {
         match &self.own {
-            _ if proposal.as_given => Ok(self.given.file.clone()),
             Some(own) => self.by_lsq(own, proposal.model),
             None => Ok(self.by_sums(proposal)),
         }
@@ -93,6 +92,7 @@ impl OwnRefit<'_> {
     fn by_lsq(&self, own: &OwnFit, model: &AugmentedModel) -> Result<ModelFile, IdentifyError> {
         let settings = LsqSettings {
             consistent: self.given.file.is_consistent(),
+            consistent_whatever: true,
             friction: own.friction.as_ref(),
             hold_friction: own.hold_friction,
             ..LsqSettings::default()
@@ -120,6 +120,26 @@ impl OwnRefit<'_> {
         pairs
             .map(|(log, course)| log.minus_torque(course))
             .collect()
+    }
+
+    /// A file moved as much as a model is off that which it was made of.
+    pub fn moved(
+        &self,
+        (from, file): (&AugmentedModel, &ModelFile),
+        to: &AugmentedModel,
+    ) -> ModelFile {
+        let mut file = file.clone();
+        let held = |u: &&Unknown| self.hold_friction && matches!(u, Unknown::Friction { .. });
+        for unknown in self.unknowns.iter().filter(|u| !held(u)) {
+            let (name, joint) = key_of(to, *unknown);
+            let by = value_of(to, *unknown) - value_of(from, *unknown);
+            let own = file.parameters.iter_mut();
+            for p in own.filter(|p| p.name == name && p.joint == joint) {
+                p.value += by;
+                p.consistent = p.consistent.map(|x| x + by);
+            }
+        }
+        file
     }
 
     /// The given model with the declared numbers by the judge's sums, consistent ones nearest to them in their metric.

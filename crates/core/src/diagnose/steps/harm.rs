@@ -84,7 +84,7 @@ impl EffectJudge<'_> {
     fn alone(&self) -> StepResult<AugmentedModel> {
         let estimates = EffectEstimates::of(&self.field, &[])?;
         let model = self.based(self.prepared.refitted(&self.fitted(&[]))?);
-        self.in_use((&model, false), &estimates)
+        self.in_use((&model, None), &estimates)
     }
 
     /// Where the second model is worse than the first; none where it is nowhere. Rows that were given for it speak joint

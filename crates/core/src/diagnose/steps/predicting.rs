@@ -10,13 +10,14 @@ use crate::diagnose::outcome::{JudgedEffects, NotWritten, PredictingTerm};
 use crate::diagnose::prepared::{PreparedCase, SummedProducts};
 use crate::diagnose::problem::data_split::LogRole;
 use crate::diagnose::problem::prediction_numbers::PredictionNumbers;
-use crate::diagnose::problem::unknowns::{Unknown, step, value_of};
+use crate::diagnose::problem::unknowns::{DiagnosisUnknowns, Unknown, step, value_of};
 use crate::diagnose::search::{ChosenCandidate, own_joint};
 use crate::diagnose::searched::SearchedCase;
 use crate::diagnose::tables::{EffectEstimates, VerifiedEffect, beside_the_others};
 use crate::diagnose::watch::DiagnosisWatch;
 use crate::effect::{AugmentedModel, ModelEffect};
-use crate::judge::{BlockSums, Numbers, compare, divide};
+use crate::judge::{BlockSums, Bound, Numbers, Terms, compare, divide};
+use crate::robot::model::JointFriction;
 
 mod choose;
 mod stretches;
@@ -39,9 +40,7 @@ pub fn write_for_prediction(
             ..named
         });
     }
-    let mut start = prepared.fitted.model.clone();
-    start.effects.clone_from(&named.proposed.effects);
-    let about = prepared.refitted(&start)?;
+    let about = named.written.clone();
     let (mut list, _) = candidates(&about, case, &prepared.cover);
     for candidate in &mut list {
         if !choose::may_predict(&about, (case, &prepared.cover), &candidate.effect) {
@@ -57,6 +56,7 @@ pub fn write_for_prediction(
     let blocks = [fitted.as_slice(), &held].concat();
     let mut summed = prepared.summed_over(about, &list, (&directions, &blocks))?;
     let held = summed.sums.split_off(fitted.len());
+    hold_bodies(&mut summed.declared, &prepared.unknowns, &summed.about);
     let chosen = prepared.field(&list, &summed).that_predict(watch)?;
     let mut terms: Vec<PendingEffect> = chosen.into_iter().map(pending).collect();
     if terms.is_empty() {
@@ -66,23 +66,17 @@ pub fn write_for_prediction(
         prepared,
         field: prepared.field(&list, &summed),
         noisier: None,
-        logs: fitted.iter().map(|b| b.log).collect(),
         other_numbers: true,
     };
     work.keep_what_predicts(&mut terms)?;
-    while let Some(harm) =
-        (work.worst_on(&terms, &held)).or_else(|| work.harm_to_other_logs(&terms, &part_of))
-    {
+    while let Some(harm) = work.worst_on(&terms, &held) {
         terms[harm].left = Some(NotWritten::HeldOut);
         work.keep_what_predicts(&mut terms)?;
     }
     let errors = work.held_out_errors(&terms, &held);
     let whole = SummedProducts {
-        about: summed.about.clone(),
-        directions,
-        layout: summed.layout.clone(),
         sums: summed.sums.followed_by(held),
-        declared: summed.declared.clone(),
+        ..summed.clone()
     };
     // blocks that are set aside are of the fitted logs: asked, they are fitted with the others
     if !case.roles.contains(&LogRole::Holdout) {
@@ -286,8 +280,7 @@ impl EffectJudge<'_> {
             if !terms.iter().any(PendingEffect::stands) {
                 return Ok(named);
             }
-            self.other_numbers = self.wants_other_numbers(&terms)?;
-            let written = self.written(&terms, &estimates)?;
+            let written = self.beside_named(&terms, &estimates, &named)?;
             let rows = self.prepared.held_out(LogRole::Holdout);
             let change = rows.change([&named.written, &written.1])?;
             let noticeable = self.field.numbers().noticeable;
@@ -309,6 +302,35 @@ impl EffectJudge<'_> {
         }
     }
 
+    /// The terms beside what is named: the friction of a joint moves with the terms on it, and bodies stay, for what a
+    /// joint's own torque asks of them other joints and other poses would pay.
+    fn beside_named(
+        &self,
+        terms: &[PendingEffect],
+        estimates: &EffectEstimates,
+        named: &JudgedEffects,
+    ) -> StepResult<(AugmentedModel, AugmentedModel)> {
+        let stand: Vec<&PendingEffect> = terms.iter().filter(|t| t.amplitude.is_some()).collect();
+        let beside = self.fitted(&stand);
+        let unknowns = &self.prepared.unknowns;
+        let mut model = named.proposed.clone();
+        let mut by = moved(unknowns, &self.field.summed.about, &beside);
+        for (by, unknown) in by.iter_mut().zip(&unknowns.list) {
+            let place = |t: &&PendingEffect| self.field.effect(&t.chosen).place;
+            let of_term = |j: usize| stand.iter().any(|t| place(t).touches(j));
+            match unknown {
+                Unknown::Friction { joint, .. } if of_term(*joint) => {}
+                Unknown::Offset(joint) if of_term(*joint) => {}
+                _ => *by = 0.0,
+            }
+        }
+        step(&mut model, unknowns, &by);
+        model.effects = beside.effects;
+        let numbers_of = Some(named.proposed.effects.as_slice());
+        let in_use = self.in_use((&model, numbers_of), estimates)?;
+        Ok((model, in_use))
+    }
+
     /// The named effects and the terms beside them in one model.
     fn put_beside(
         &self,
@@ -317,20 +339,18 @@ impl EffectJudge<'_> {
         (proposed, written): (AugmentedModel, AugmentedModel),
     ) -> JudgedEffects {
         let unknowns = &self.prepared.unknowns;
-        let moved = |from: &AugmentedModel, to: &AugmentedModel| -> Vec<f64> {
-            let by = |u: &Unknown| value_of(to, *u) - value_of(from, *u);
-            unknowns.list.iter().map(by).collect()
-        };
         // what a named effect is drawn beside has the terms too
         for found in &mut named.steps {
             if let (Some(without), Some(place)) = (&mut found.without, found.written) {
-                let by = moved(&named.written, without);
+                let by = moved(unknowns, &named.written, without);
                 *without = written.clone();
                 step(without, unknowns, &by);
                 without.effects.remove(place);
             }
         }
-        for (shift, by) in (named.to_estimate.iter_mut()).zip(moved(&proposed, &named.proposed)) {
+        for (shift, by) in
+            (named.to_estimate.iter_mut()).zip(moved(unknowns, &proposed, &named.proposed))
+        {
             *shift += by;
         }
         let own = self.prediction();
@@ -354,6 +374,38 @@ impl EffectJudge<'_> {
         named.predicting = described.collect();
         (named.proposed, named.written) = (proposed, written);
         named
+    }
+}
+
+/// How much the unknowns of one model are off those of another.
+fn moved(unknowns: &DiagnosisUnknowns, from: &AugmentedModel, to: &AugmentedModel) -> Vec<f64> {
+    let by = |u: &Unknown| value_of(to, *u) - value_of(from, *u);
+    unknowns.list.iter().map(by).collect()
+}
+
+/// Holds the bodies of a model; the friction of each joint moves beside a term on it, and does not come to push.
+fn hold_bodies(declared: &mut Terms, unknowns: &DiagnosisUnknowns, about: &AugmentedModel) {
+    for (i, (term, unknown)) in declared.list.iter_mut().zip(&unknowns.list).enumerate() {
+        match unknown {
+            Unknown::Theta(_) => {
+                term.columns.clear();
+                term.bound = Bound {
+                    least: 0.0,
+                    most: 0.0,
+                };
+                if i < declared.prior.1.len() {
+                    declared.prior.0.row_mut(i).fill(0.0);
+                    declared.prior.0.column_mut(i).fill(0.0);
+                    declared.prior.1[i] = 0.0;
+                }
+            }
+            Unknown::Friction { joint, .. } => {
+                if let JointFriction::ViscousCoulomb(_) = about.model.friction[*joint] {
+                    term.bound.least = -value_of(about, *unknown).max(0.0);
+                }
+            }
+            Unknown::Offset(_) => {}
+        }
     }
 }
 

@@ -48,9 +48,6 @@ pub(super) fn certainty(step: &FoundEffect) -> String {
             number::percent(step.shrinkage)
         ),
         Some(NotWritten::HeldOut) => format!("{by}; held-out data are worse with it"),
-        Some(NotWritten::OtherLogs) => {
-            format!("{by}; a log that is left out is worse predicted with it by the others")
-        }
         Some(NotWritten::Bound) => "at a bound beside the other effects".to_owned(),
         Some(NotWritten::Small) => format!("{by}; it changes no error noticeably"),
         Some(NotWritten::Unsure) if measurable && step.shrinkage > 0.0 => {

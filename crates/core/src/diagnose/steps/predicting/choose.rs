@@ -11,25 +11,29 @@ use crate::effect::{AugmentedModel, Family, LogCoverage, ModelEffect, Role, Shap
 use crate::judge::ErrorGain;
 
 /// Whether an effect may be written for prediction alone: friction, what goes round with the position, and what goes by
-/// the load or by another joint's motion, with its shape inside its range. The corner of Coulomb friction, by whose direction all other
-/// friction goes, is named from three deviations on. A law of time or of the pose is told from
-/// others by other motions alone, an elasticity or a delay is no torque of which a part predicts, and a formula of the
-/// user's own is named or not.
+/// the load or by another joint's motion, with its shape inside its range. The corner of Coulomb friction, by whose
+/// direction all other friction goes, is named from three deviations on. A law of time or of the pose is told from others
+/// by other motions alone, an elasticity or a delay is no torque of which a part predicts, and a formula of the user's own
+/// is named or not.
 pub(super) fn may_predict(
     model: &AugmentedModel,
     (case, cover): (&DiagnosisCase, &LogCoverage),
     effect: &ModelEffect,
 ) -> bool {
-    let entry = effect.law.entry;
-    let is_static = match effect.family() {
+    let (law, entry) = (effect.law, effect.law.entry);
+    let goes_round = entry.search == ShapeSearch::Orders;
+    let predicts = |family: &Family| match family {
         Family::Velocity | Family::Load | Family::Memory | Family::Cross => true,
-        Family::Position => entry.search == ShapeSearch::Orders,
+        Family::Position => goes_round,
         _ => false,
     };
-    let law = effect.law;
+    let by_pose = entry.families.contains(&Family::Position) && !goes_round;
     let of_columns =
         entry.role == Role::Columns && law.formula.is_none() && law.direction.is_none();
-    is_static && of_columns && shape_end(model, case, cover, effect).is_none()
+    predicts(&effect.family())
+        && !by_pose
+        && of_columns
+        && shape_end(model, case, cover, effect).is_none()
 }
 
 /// A candidate that passes for a joint.
