@@ -407,6 +407,7 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
             .map(|(key, x)| ((*key).to_owned(), number(*x)));
         file.effects = vec![cft_ident::config::model_file::EffectSection {
             shrinkage: None,
+            prediction_only: false,
             accepted_by_user: false,
             name: name.to_owned(),
             joint: Some("elbow".to_owned()),

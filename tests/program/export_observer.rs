@@ -58,6 +58,7 @@ fn effect(name: &str, joint: &str, numbers: &[(&str, f64)]) -> EffectSection {
         name: name.to_owned(),
         joint: Some(joint.to_owned()),
         shrinkage: None,
+        prediction_only: false,
         accepted_by_user: false,
         parameters: (numbers.iter())
             .map(|(key, value)| ((*key).to_owned(), number(*value)))
