@@ -29,8 +29,8 @@ impl Campaign {
     }
 
     /// Fits and diagnoses, and says what was written and what it did to the unseen log: the exit status, the steps as
-    /// `[effect, family, joint, status, alternatives, parameters]`, the effects written as `[name, joint]`, and the errors by joint
-    /// before and after. `model.toml` and `refined.toml` are left in the folder.
+    /// `[effect, family, joint, status, alternatives, parameters]`, the effects written as `[name, joint]`, those that are
+    /// written for prediction alone apart, and the errors by joint before and after. `model.toml` and `refined.toml` are left in the folder.
     pub fn diagnosed(&self, tool: &Tool, folder: &File) -> Result<Value, StudyError> {
         let logs = || self.fitted.iter().map(String::as_str);
         let mut words = vec!["lsq", "-r", &self.robot, "-o", "model.toml"];
@@ -75,7 +75,10 @@ impl Campaign {
                 after.remove(at);
             }
         }
-        row["written"] = json!(after);
+        let (predicting, named): (Vec<_>, Vec<_>) =
+            after.into_iter().partition(|e| e.predicts_only);
+        row["written"] = json!(names_of(&named));
+        row["predicting"] = json!(names_of(&predicting));
         if let Some(unseen) = &self.unseen {
             row["unseen_before"] = json!(errors(tool, folder, unseen, "model.toml")?);
             row["unseen_after"] = json!(errors(tool, folder, unseen, "refined.toml")?);
@@ -84,14 +87,32 @@ impl Campaign {
     }
 }
 
-/// Names and joints of a model's effects.
-fn effects(model: &Model) -> Vec<(String, String)> {
+/// An effect of a model file.
+#[derive(PartialEq)]
+struct WrittenEffect {
+    name: String,
+    joint: String,
+    predicts_only: bool,
+}
+
+/// The effects of a model.
+fn effects(model: &Model) -> Vec<WrittenEffect> {
     let text = |effect: &toml::Value, key: &str| {
         let value = effect.get(key).and_then(toml::Value::as_str);
         value.unwrap_or_default().to_owned()
     };
-    let both = |effect: &toml::Value| (text(effect, "name"), text(effect, "joint"));
-    model.effect.iter().map(both).collect()
+    let of = |effect: &toml::Value| WrittenEffect {
+        name: text(effect, "name"),
+        joint: text(effect, "joint"),
+        predicts_only: effect.get("prediction_only").and_then(toml::Value::as_bool) == Some(true),
+    };
+    model.effect.iter().map(of).collect()
+}
+
+/// Names and joints of effects.
+fn names_of(effects: &[WrittenEffect]) -> Vec<[&str; 2]> {
+    let names = effects.iter().map(|e| [e.name.as_str(), e.joint.as_str()]);
+    names.collect()
 }
 
 /// Whether the diagnosis came to its end.
