@@ -43,19 +43,19 @@ pub fn diagnose(
     let judged = judge(&prepared, &searched)?;
     refuse_failed(&prepared, &judged)?;
     watch.unless_stopped()?;
-    let with_predicting = |searched: &SearchedCase, judged: &JudgedEffects| {
-        let judged = write_for_prediction(&prepared, searched, judged.clone(), watch)?;
-        prepared.evaluate(searched, judged)
-    };
-    let mut found = with_predicting(&searched, &judged)?;
+    let mut asked = (searched, judged);
+    let mut formulas = Vec::new();
     if case.wishes.search {
-        let formulas = prepared.formulas((&searched, &judged), &found, watch)?;
-        if let Some((searched, judged)) = formulas.accepted {
-            found = with_predicting(&searched, &judged)?;
-        }
-        found.formulas = formulas.formulas;
+        // formulas are sought in what the names leave; terms that predict would take part of it
+        let named = prepared.evaluate(&asked.0, asked.1.clone())?;
+        let sought = prepared.formulas((&asked.0, &asked.1), &named, watch)?;
+        formulas = sought.formulas;
+        asked = sought.accepted.unwrap_or(asked);
     }
-    Ok(found)
+    let (searched, judged) = asked;
+    let judged = write_for_prediction(&prepared, &searched, judged, watch)?;
+    let found = prepared.evaluate(&searched, judged)?;
+    Ok(Diagnosis { formulas, ..found })
 }
 
 /// Refuses what cannot be fitted.
