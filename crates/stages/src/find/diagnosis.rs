@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::diagnose::{DataFault, Diagnosed};
 use super::formulas::{
-    EffectValueFound, FormulaResult, JointGain, formula_result, gain_of_each, numbers_of,
+    EffectValueFound, FormulaResult, JointGain, by_key, formula_result, gain_of_each, numbers_of,
     values_found,
 };
 use super::next_motion::separating_command;
@@ -205,14 +205,6 @@ pub struct BlockAside {
     /// By the log's own clock \[s\].
     pub from_s: f64,
     pub to_s: f64,
-}
-
-/// A list of keys and values as a map, in its order.
-pub(super) fn by_key<S: Serializer, T: Serialize>(
-    list: &[(String, T)],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(list.iter().map(|(key, value)| (key, value)))
 }
 
 impl DiagnosisResult {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::diagnose::Diagnosed;
 use crate::input::robot_setup::RobotSetup;
@@ -16,6 +16,14 @@ use cft_ident_core::judge::ErrorGain;
 use cft_ident_core::number;
 use cft_ident_core::robot::FormulaSignal;
 use cft_ident_files::config::candidates::{self, CandidateSection, ShapeRange};
+
+/// A list of keys and values as a map, in its order.
+pub(super) fn by_key<S: Serializer, T: Serialize>(
+    list: &[(String, T)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(list.iter().map(|(key, value)| (key, value)))
+}
 
 /// What a joint gains.
 #[derive(Debug, Clone, Serialize, JsonSchema)]

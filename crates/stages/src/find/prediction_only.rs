@@ -6,8 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::diagnose::Diagnosed;
-use super::diagnosis::by_key;
-use super::formulas::{EffectValueFound, JointGain, gain_of_each, values_found};
+use super::formulas::{EffectValueFound, JointGain, by_key, gain_of_each, values_found};
 use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::diagnose::PredictingTerm;
 

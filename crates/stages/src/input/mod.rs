@@ -23,6 +23,7 @@ pub(crate) mod repeated;
 pub(crate) mod robot_setup;
 pub(crate) mod row_notes;
 pub(crate) mod setup_file;
+pub(crate) mod summed_errors;
 pub(crate) mod temperatures;
 pub(crate) mod track_error;
 pub(crate) mod unknown_key;

@@ -10,10 +10,8 @@ mod factors;
 mod file;
 mod matrix;
 pub(crate) mod reduced_log;
-mod summed_errors;
 
 pub use error::ReducedError;
 pub use file::{FORMAT, is_reduced};
 pub(crate) use reduced_log::ReducedRows;
 pub use reduced_log::{FrictionGiven, MadeWith, ReducedLog, ReducedLogs};
-pub(crate) use summed_errors::check_smoothed_alike;

@@ -37,7 +37,7 @@ pub(super) fn may_predict(
 }
 
 /// A candidate that passes for a joint.
-struct Admitted {
+struct AdmittedCandidate {
     candidate: usize,
     gain: ErrorGain,
     joint: usize,
@@ -68,13 +68,14 @@ impl Field<'_> {
                 let gain = left_out.gain(self.terms_of(*i));
                 self.admitted(*i, gain, &before)
             };
-            let admitted: Vec<Admitted> = open.par_iter().filter_map(look).collect();
-            let mut next: Vec<&Admitted> = Vec::new();
+            let admitted: Vec<AdmittedCandidate> = open.par_iter().filter_map(look).collect();
+            let mut next: Vec<&AdmittedCandidate> = Vec::new();
             for j in 0..joints {
                 let own = admitted.iter().filter(|a| a.joint == j);
                 let best = own.max_by(|a, b| a.part.total_cmp(&b.part));
-                let effect = |a: &Admitted| &self.candidates[a.candidate].effect;
-                let stands = |a: &&Admitted| !next.iter().any(|n| exclude(effect(n), effect(a)));
+                let effect = |a: &AdmittedCandidate| &self.candidates[a.candidate].effect;
+                let stands =
+                    |a: &&AdmittedCandidate| !next.iter().any(|n| exclude(effect(n), effect(a)));
                 next.extend(best.filter(stands));
             }
             if next.is_empty() {
@@ -83,7 +84,8 @@ impl Field<'_> {
             // where nothing was taken the next turn finds what this one did
             open.retain(|i| {
                 let effect = &self.candidates[*i].effect;
-                let taken = |a: &&Admitted| exclude(&self.candidates[a.candidate].effect, effect);
+                let taken =
+                    |a: &&AdmittedCandidate| exclude(&self.candidates[a.candidate].effect, effect);
                 let near = next.iter().any(|a| effect.place.touches(a.joint));
                 near && !next.iter().any(|a| taken(&a))
             });
@@ -100,7 +102,12 @@ impl Field<'_> {
 
     /// A candidate for the joint whose error it takes most off, where that is enough and no other joint loses as much;
     /// `before` are the weighted squares of blocks left out, joint by joint.
-    fn admitted(&self, candidate: usize, gain: ErrorGain, before: &[f64]) -> Option<Admitted> {
+    fn admitted(
+        &self,
+        candidate: usize,
+        gain: ErrorGain,
+        before: &[f64],
+    ) -> Option<AdmittedCandidate> {
         let numbers = &self.prepared.case.prediction;
         let part = |j: usize| match before[j] > 0.0 {
             true => 1.0 - (1.0 - gain.joints[j][0] / before[j]).max(0.0).sqrt(),
@@ -124,7 +131,7 @@ impl Field<'_> {
         }?;
         let harmless = (0..before.len()).all(|j| j == joint || !loses(j));
         let part = part(joint);
-        harmless.then_some(Admitted {
+        harmless.then_some(AdmittedCandidate {
             candidate,
             gain,
             joint,

@@ -1,10 +1,10 @@
 //! The errors that a model leaves of reduced logs, by their sums.
 
-use super::error::ReducedError;
-use super::reduced_log::ReducedLog;
-use crate::input::dataset::Dataset;
-use crate::input::robot_setup::RobotSetup;
-use crate::input::unknowns::columns;
+use super::dataset::Dataset;
+use super::reduced::error::ReducedError;
+use super::reduced::reduced_log::ReducedLog;
+use super::robot_setup::RobotSetup;
+use super::unknowns::columns;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::number;
