@@ -42,11 +42,12 @@ const LINES: [(&str, &str); 16] = [
 /// Commands that take none of these inputs.
 const WITHOUT: [&str; 6] = ["identify", "drive", "tool", "new", "example", "generate"];
 /// Options that change a result only where the data ask for it, there is more than one joint, or the model has effects.
-const IDLE: [(&str, &str); 6] = [
+const IDLE: [(&str, &str); 7] = [
     ("", "as-declared"),
     ("", "fix-setup"),
     ("", "joint"),
     ("convert", "drop-rows"),
+    ("diagnose", "named-only"),
     ("friction", "model"),
     ("export", "without-effects"),
 ];
