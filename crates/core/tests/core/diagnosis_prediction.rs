@@ -103,8 +103,9 @@ fn named_only_writes_what_is_named_as_it_is_beside_what_predicts() {
 
 #[test]
 fn one_motion_of_few_independent_stretches_writes_nothing_for_prediction() {
-    // a period of two seconds, fifteen times: four parts as long as a block is at least
-    let turn = std::f64::consts::TAU / 2.0;
+    // four parts as long as a block is at least, over and over
+    let period_s = 4.5 * diagnosed(&weak()).block_s;
+    let turn = std::f64::consts::TAU / period_s;
     let waves = vec![[0.7, turn, 0.4], [0.3, 2.0 * turn, 1.9]];
     let how = (30.0, NOISE, 5);
     let repeated = log(&model(), &[waves], how, &|_, _, s| ripples(s[0][0]));

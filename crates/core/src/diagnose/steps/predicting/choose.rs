@@ -11,9 +11,9 @@ use crate::effect::{AugmentedModel, Family, LogCoverage, ModelEffect, Role, Shap
 use crate::judge::ErrorGain;
 
 /// Whether an effect may be written for prediction alone: friction, what goes round with the position, and what goes by
-/// the load or by another joint's motion, with its shape inside its range. The corner of Coulomb friction, by whose
-/// direction all other friction goes, is named from three deviations on. A law of time or of the pose is told from others
-/// by other motions alone, an elasticity or a delay is no torque of which a part predicts, and a formula of the user's own
+/// the load, with its shape inside its range. The corner of Coulomb friction, by whose
+/// direction all other friction goes, is named from three deviations on. A law of time, of the pose or of another
+/// joint's motion is told from others by other motions alone, an elasticity or a delay is no torque of which a part predicts, and a formula of the user's own
 /// is named or not.
 pub(super) fn may_predict(
     model: &AugmentedModel,
@@ -23,7 +23,7 @@ pub(super) fn may_predict(
     let (law, entry) = (effect.law, effect.law.entry);
     let goes_round = entry.search == ShapeSearch::Orders;
     let predicts = |family: &Family| match family {
-        Family::Velocity | Family::Load | Family::Memory | Family::Cross => true,
+        Family::Velocity | Family::Load | Family::Memory => true,
         Family::Position => goes_round,
         _ => false,
     };
