@@ -87,7 +87,7 @@ impl Field<'_> {
                 let taken =
                     |a: &&AdmittedCandidate| exclude(&self.candidates[a.candidate].effect, effect);
                 let near = next.iter().any(|a| effect.place.touches(a.joint));
-                near && !next.iter().any(|a| taken(&a))
+                near && !next.iter().any(taken)
             });
             chosen.extend(next.into_iter().map(|a| ChosenCandidate {
                 candidate: a.candidate,
