@@ -8,7 +8,7 @@ use super::held_out::{EffectChange, HeldOutRows};
 use super::outcome::{FoundEffect, JudgedEffects, NotWritten, StepStatus};
 use super::prepared::PreparedCase;
 use super::problem::data_split::LogRole;
-use super::problem::unknowns::{Unknown, step, value_of};
+use super::problem::unknowns::step;
 use super::refit::ModelProposal;
 use super::search::{ChosenCandidate, Field};
 use super::searched::SearchedCase;
@@ -48,8 +48,34 @@ struct FittedEffect {
 }
 
 impl PendingEffect {
+    /// Nothing of it is known yet but that it was chosen.
+    fn of(chosen: ChosenCandidate) -> Self {
+        PendingEffect {
+            accepted: chosen.accepted,
+            chosen,
+            found: None,
+            left: None,
+            came_back: false,
+            amplitude: None,
+            change: None,
+            without: None,
+        }
+    }
+
     fn stands(&self) -> bool {
         self.left.is_none()
+    }
+}
+
+/// Gives what stands the part of its fitted amplitude that is written, and what left none.
+fn give_amplitudes(ways: &mut [PendingEffect], part: impl Fn(&PendingEffect) -> f64) {
+    for way in ways {
+        let found = way.found.as_ref().filter(|_| way.stands());
+        let amplitude = found.map(|found| {
+            let part = part(way);
+            found.effect.linear.iter().map(|x| part * x).collect()
+        });
+        way.amplitude = amplitude;
     }
 }
 
@@ -104,17 +130,8 @@ struct EffectJudge<'a> {
 impl EffectJudge<'_> {
     /// The effects that were chosen, and those that the user wants.
     fn ways(&self, searched: &SearchedCase) -> Vec<PendingEffect> {
-        let way = |chosen: &ChosenCandidate| PendingEffect {
-            accepted: chosen.accepted,
-            chosen: chosen.clone(),
-            found: None,
-            left: None,
-            came_back: false,
-            amplitude: None,
-            change: None,
-            without: None,
-        };
-        searched.chosen.iter().map(way).collect()
+        let chosen = searched.chosen.iter().cloned();
+        chosen.map(PendingEffect::of).collect()
     }
 
     /// Lets effects leave until all that stand pass beside one another, the least sure first.
@@ -132,13 +149,7 @@ impl EffectJudge<'_> {
             match leaves.min_by(|a, b| certainty(a.0).total_cmp(&certainty(b.0))) {
                 Some((i, why)) => ways[i].left = Some(why),
                 None => {
-                    ways.iter_mut().for_each(|way| way.amplitude = None);
-                    for i in set {
-                        let factor = self.factor(&ways[i]);
-                        let found = ways[i].found.as_ref();
-                        let own = found.map(|f| f.effect.linear.iter());
-                        ways[i].amplitude = own.map(|a| a.map(|x| factor * x).collect());
-                    }
+                    give_amplitudes(ways, |way| self.factor(way));
                     return Ok(estimates);
                 }
             }
@@ -323,9 +334,7 @@ impl EffectJudge<'_> {
     fn as_given(&self, mut model: AugmentedModel) -> AugmentedModel {
         let unknowns = &self.prepared.unknowns;
         let (given, fitted) = (&self.prepared.case.given, &self.prepared.fitted.model);
-        let off = |u: &Unknown| value_of(given, *u) - value_of(fitted, *u);
-        let off: Vec<f64> = unknowns.list.iter().map(off).collect();
-        step(&mut model, unknowns, &off);
+        step(&mut model, unknowns, &unknowns.moved(fitted, given));
         model
     }
 
@@ -359,10 +368,8 @@ impl EffectJudge<'_> {
             let without = self.based(self.fitted(&others));
             ways[*i].change = rows.change([&without, &with])?;
             // the written model moved by as much as the judge's sums move without the effect
-            let moved = |u: &Unknown| value_of(&without, *u) - value_of(&with, *u);
-            let moved: Vec<f64> = unknowns.list.iter().map(moved).collect();
             let mut alone = written.clone();
-            step(&mut alone, unknowns, &moved);
+            step(&mut alone, unknowns, &unknowns.moved(&with, &without));
             alone.effects.remove(before + at);
             ways[*i].without = Some(alone);
         }

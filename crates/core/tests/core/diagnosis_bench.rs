@@ -8,9 +8,10 @@ use cft_ident_core::diagnose::{
 use cft_ident_core::effect::{AugmentedModel, ModelEffect};
 use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::motion::{FilterSettings, ParallelFilters, Stretch};
-use cft_ident_core::robot::Robot;
 use cft_ident_core::robot::drive::JointDrive;
-use cft_ident_core::robot::model::Model;
+use cft_ident_core::robot::friction::ViscousCoulomb;
+use cft_ident_core::robot::model::{JointFriction, Model};
+use cft_ident_core::robot::{JointKind, Robot};
 use nalgebra::DMatrix;
 
 pub const DT: f64 = 0.01;
@@ -22,6 +23,19 @@ impl Chance {
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         f64::from(self.0 >> 8) / f64::from(1 << 24) - 0.5
+    }
+}
+
+/// A revolute joint with viscous and Coulomb friction and an offset, its numbers times a scale.
+pub fn one_joint(scale: f64) -> Model {
+    Model {
+        robot: Robot::single_joint("q1", JointKind::Revolute),
+        theta: vec![scale * 0.4],
+        friction: vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
+            viscous: scale * 0.8,
+            coulomb: scale * 1.5,
+        })],
+        offset: vec![scale * 0.3],
     }
 }
 

@@ -4,25 +4,11 @@
 use cft_ident_core::diagnose::{AcceptedEffect, Diagnosis, FormulaEnd, FoundFormula};
 use cft_ident_core::effect::{AugmentedModel, own};
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::friction::ViscousCoulomb;
-use cft_ident_core::robot::model::{JointFriction, Model};
-use cft_ident_core::robot::{FormulaSignal, JointKind, Robot};
+use cft_ident_core::robot::FormulaSignal;
 
-use crate::diagnosis_bench::{Waves, case, diagnosed, log, written};
+use crate::diagnosis_bench::{Waves, case, diagnosed, log, one_joint, written};
 
 const SECONDS: f64 = 40.0;
-
-fn model() -> Model {
-    Model {
-        robot: Robot::single_joint("q1", JointKind::Revolute),
-        theta: vec![0.4],
-        friction: vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
-            viscous: 0.8,
-            coulomb: 1.5,
-        })],
-        offset: vec![0.3],
-    }
-}
 
 type More = dyn Fn([f64; 3]) -> f64;
 
@@ -35,14 +21,14 @@ fn logs(more: &More, noise: f64) -> Vec<Stretch> {
             [0.1, 7.1 * by, 0.7],
         ];
         let how = (SECONDS, noise, 31 + of as u32);
-        log(&model(), &[waves], how, &|_, _, s| more(s[0]))
+        log(&one_joint(1.0), &[waves], how, &|_, _, s| more(s[0]))
     };
     (0..2).map(one).collect()
 }
 
 /// A search for formulas, of which that of the joint is written where it is `wanted`.
 fn searched(more: &More, wanted: bool) -> Diagnosis {
-    let mut case = case(&model(), logs(more, 0.2), 0.02);
+    let mut case = case(&one_joint(1.0), logs(more, 0.2), 0.02);
     case.wishes.search = true;
     if wanted {
         case.wishes.accepted = vec![AcceptedEffect::named("formula:q1")];
@@ -90,7 +76,7 @@ fn an_inertia_that_hangs_on_the_position_is_found_as_a_formula_and_written_where
     let along = &logs(&planted, 0.0)[1];
     let (hat, plain) = (
         found.in_use.torques(along).hat,
-        AugmentedModel::plain(model()).torques(along).hat,
+        AugmentedModel::plain(one_joint(1.0)).torques(along).hat,
     );
     let rms = |x: &[f64]| {
         let pairs = x.iter().zip(&along.tau[0]);
@@ -123,7 +109,7 @@ fn a_damping_that_hangs_on_the_position_is_found_as_friction() {
     assert!(own.definition.friction);
     assert!((own.step.estimate.linear[0] / 0.5 - 1.0).abs() < 0.05);
     // the law of a definition is that of the formula along any motion
-    let robot = model().robot;
+    let robot = one_joint(1.0).robot;
     let law = own::law(&own.definition, &robot).expect("it was found");
     assert!(std::ptr::eq(law, own.step.estimate.law));
     let [without, with] = own.at_reversals.expect("the joint reverses");

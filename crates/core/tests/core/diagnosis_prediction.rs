@@ -2,25 +2,10 @@
 
 use cft_ident_core::diagnose::{Diagnosis, DiagnosisCase, LogRole, UseErrors};
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::friction::ViscousCoulomb;
-use cft_ident_core::robot::model::{JointFriction, Model};
-use cft_ident_core::robot::{JointKind, Robot};
 
-use crate::diagnosis_bench::{Waves, case, diagnosed, log, written};
+use crate::diagnosis_bench::{Waves, case, diagnosed, log, one_joint, written};
 
 const NOISE: f64 = 0.6;
-
-fn model() -> Model {
-    Model {
-        robot: Robot::single_joint("q1", JointKind::Revolute),
-        theta: vec![0.4],
-        friction: vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
-            viscous: 0.8,
-            coulomb: 1.5,
-        })],
-        offset: vec![0.3],
-    }
-}
 
 /// A motion that does not repeat within minutes; each number another one.
 fn waves(of: usize) -> Waves {
@@ -43,13 +28,15 @@ fn ripples(q: f64) -> f64 {
 
 fn one(of: usize, seconds: f64, more: &dyn Fn(f64, f64) -> f64) -> Stretch {
     let how = (seconds, NOISE, 11 + of as u32);
-    log(&model(), &[waves(of)], how, &|_, t, s| more(t, s[0][0]))
+    log(&one_joint(1.0), &[waves(of)], how, &|_, t, s| {
+        more(t, s[0][0])
+    })
 }
 
 /// Two logs that are fitted and a third that only tells.
 fn weak() -> DiagnosisCase {
     let logs = (0..3).map(|of| one(of, 15.0, &|_, q| ripples(q)));
-    let mut case = case(&model(), logs.collect(), 0.02);
+    let mut case = case(&one_joint(1.0), logs.collect(), 0.02);
     case.roles = vec![LogRole::Train, LogRole::Train, LogRole::Holdout];
     case
 }
@@ -108,8 +95,8 @@ fn one_motion_of_few_independent_stretches_writes_nothing_for_prediction() {
     let turn = std::f64::consts::TAU / period_s;
     let waves = vec![[0.7, turn, 0.4], [0.3, 2.0 * turn, 1.9]];
     let how = (30.0, NOISE, 5);
-    let repeated = log(&model(), &[waves], how, &|_, _, s| ripples(s[0][0]));
-    let found = diagnosed(&case(&model(), vec![repeated], 0.02));
+    let repeated = log(&one_joint(1.0), &[waves], how, &|_, _, s| ripples(s[0][0]));
+    let found = diagnosed(&case(&one_joint(1.0), vec![repeated], 0.02));
     assert!(found.predicting.is_empty());
     assert!(
         found.too_few_stretches.is_some_and(|n| n < 6),

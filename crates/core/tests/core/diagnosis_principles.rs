@@ -7,27 +7,14 @@ use cft_ident_core::diagnose::{
 };
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::Stretch;
-use cft_ident_core::robot::friction::ViscousCoulomb;
-use cft_ident_core::robot::model::{JointFriction, Model};
-use cft_ident_core::robot::{JointKind, Robot};
 use std::sync::Mutex;
 
-use crate::diagnosis_bench::{Waves, case, diagnosed, effect, log, number, try_diagnosed, written};
+use crate::diagnosis_bench::{
+    Waves, case, diagnosed, effect, log, number, one_joint, try_diagnosed, written,
+};
 
 const SECONDS: f64 = 40.0;
 const NOISE: f64 = 0.2;
-
-fn model(scale: f64) -> Model {
-    Model {
-        robot: Robot::single_joint("q1", JointKind::Revolute),
-        theta: vec![scale * 0.4],
-        friction: vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
-            viscous: scale * 0.8,
-            coulomb: scale * 1.5,
-        })],
-        offset: vec![scale * 0.3],
-    }
-}
 
 fn waves(of: usize) -> Waves {
     let by = 1.0 + 0.07 * of as f64;
@@ -43,13 +30,13 @@ type More = dyn Fn(f64, [f64; 3]) -> f64;
 fn logs(more: &More) -> Vec<Stretch> {
     let one = |of: usize| {
         let how = (SECONDS, NOISE, 11 + of as u32);
-        log(&model(1.0), &[waves(of)], how, &|_, t, s| more(t, s[0]))
+        log(&one_joint(1.0), &[waves(of)], how, &|_, t, s| more(t, s[0]))
     };
     (0..2).map(one).collect()
 }
 
 fn of(more: &More) -> (DiagnosisCase, Diagnosis) {
-    let case = case(&model(1.0), logs(more), 0.02);
+    let case = case(&one_joint(1.0), logs(more), 0.02);
     let found = diagnosed(&case);
     (case, found)
 }
@@ -187,7 +174,7 @@ fn torques_in_another_unit_give_the_same_effects_of_another_size() {
     let mut logs = logs(&ripple);
     let torques = logs.iter_mut().flat_map(|s| s.tau.iter_mut().flatten());
     torques.for_each(|tau| *tau *= by);
-    let found = diagnosed(&case(&model(by), logs, 0.02));
+    let found = diagnosed(&case(&one_joint(by), logs, 0.02));
     assert_eq!(written(&found), written(&plain));
     let [a, b] = [&plain, &found].map(|f| &f.steps[0]);
     near(b.estimate.shape[0], a.estimate.shape[0], 1e-6);
@@ -219,7 +206,7 @@ fn a_joint_that_is_counted_the_other_way_round_has_the_mirrored_effects() {
             x.iter_mut().flatten().for_each(|x| *x = -*x);
         }
     }
-    let mut given = model(1.0);
+    let mut given = one_joint(1.0);
     given.offset[0] *= -1.0;
     let found = diagnosed(&case(&given, logs, 0.02));
     assert_eq!(written(&found), ["ripple"]);
@@ -252,7 +239,7 @@ fn the_clock_of_a_log_changes_the_times_that_are_reported_alone() {
     let (_, plain) = of(&ripple);
     let mut logs = logs(&ripple);
     logs.iter_mut().for_each(|s| s.zero = 5000.0);
-    let found = diagnosed(&case(&model(1.0), logs, 0.02));
+    let found = diagnosed(&case(&one_joint(1.0), logs, 0.02));
     for (a, b) in plain.set_aside.iter().zip(&found.set_aside) {
         assert_eq!(a.log, b.log);
         assert!((b.from_s - a.from_s - 5000.0).abs() < 1e-9);
@@ -266,8 +253,10 @@ fn the_clock_of_a_log_changes_the_times_that_are_reported_alone() {
 fn friction_that_changes_from_a_time_on_is_reported_with_its_time_and_size() {
     let change = |t: f64, v: f64| if t < 50.0 { 0.0 } else { 0.7 * v.signum() };
     let how = (2.0 * SECONDS, NOISE, 5);
-    let one = log(&model(1.0), &[waves(0)], how, &|_, t, s| change(t, s[0][1]));
-    let found = diagnosed(&case(&model(1.0), vec![one], 0.02));
+    let one = log(&one_joint(1.0), &[waves(0)], how, &|_, t, s| {
+        change(t, s[0][1])
+    });
+    let found = diagnosed(&case(&one_joint(1.0), vec![one], 0.02));
     assert_eq!(found.changes.len(), 1);
     let own = &found.changes[0];
     assert_eq!((own.joint, own.log), (0, 0));
@@ -279,7 +268,7 @@ fn friction_that_changes_from_a_time_on_is_reported_with_its_time_and_size() {
 
 #[test]
 fn what_the_user_wants_is_written_and_is_nothing_where_nothing_is() {
-    let mut case = case(&model(1.0), logs(&|_, _| 0.0), 0.02);
+    let mut case = case(&one_joint(1.0), logs(&|_, _| 0.0), 0.02);
     let name = |name: &str, joint: &str| AcceptedEffect::named(&format!("{name}:{joint}"));
     case.wishes.accepted = vec![name("asymmetric-friction", "q1")];
     // another Coulomb friction forward is an offset and another in both directions
@@ -309,20 +298,20 @@ fn what_the_user_wants_is_written_and_is_nothing_where_nothing_is() {
 #[test]
 fn logs_that_determine_nothing_are_refused_with_why() {
     let short: Vec<Stretch> = logs(&|_, _| 0.0).iter().map(|s| s.part(0, 100)).collect();
-    let refused = try_diagnosed(&case(&model(1.0), short, 0.02));
+    let refused = try_diagnosed(&case(&one_joint(1.0), short, 0.02));
     assert!(matches!(
         refused,
         Err(DiagnoseError::TooFewRows { unknowns: 4, .. })
     ));
     let mut silent = logs(&|_, _| 0.0);
     silent.iter_mut().for_each(|s| s.tau[0].fill(0.0));
-    let refused = try_diagnosed(&case(&model(1.0), silent, 0.02));
+    let refused = try_diagnosed(&case(&one_joint(1.0), silent, 0.02));
     assert!(matches!(refused, Err(DiagnoseError::NoTorque { joint }) if joint == "q1"));
 }
 
 #[test]
 fn whoever_listens_hears_parts_that_begin_and_end_and_may_stop_them() {
-    let case = case(&model(1.0), logs(&ripple), 0.02);
+    let case = case(&one_joint(1.0), logs(&ripple), 0.02);
     let refit = |proposal: &ModelProposal| Ok(proposal.model.clone());
     let heard = Mutex::new((0_i32, 0, 0));
     let tell = |h: DiagnosisProgress| {
@@ -349,7 +338,7 @@ fn whoever_listens_hears_parts_that_begin_and_end_and_may_stop_them() {
 
 #[test]
 fn what_is_not_open_stays_and_what_is_known_before_holds_as_firmly_as_it_is_known() {
-    let mut case = case(&model(1.0), logs(&|_, _| 0.4), 0.02);
+    let mut case = case(&one_joint(1.0), logs(&|_, _| 0.4), 0.02);
     case.open.offset = vec![false];
     case.open.friction = vec![vec![false, true]];
     let found = diagnosed(&case);
@@ -373,11 +362,11 @@ fn a_log_that_is_given_for_it_judges_what_the_others_show() {
     let sign = [1.0, -1.0];
     let one = |of: usize| {
         let how = (2.0 * SECONDS, NOISE, 11 + of as u32);
-        log(&model(1.0), &[waves(of)], how, &|_, t, s| {
+        log(&one_joint(1.0), &[waves(of)], how, &|_, t, s| {
             sign[of] * ripple(t, s[0])
         })
     };
-    let mut case = case(&model(1.0), (0..2).map(one).collect(), 0.02);
+    let mut case = case(&one_joint(1.0), (0..2).map(one).collect(), 0.02);
     case.roles = vec![LogRole::Train, LogRole::Holdout];
     let found = diagnosed(&case);
     assert!(found.set_aside.is_empty());

@@ -11,7 +11,7 @@ pub(super) struct TextEdits<'p> {
     plain: &'p str,
     /// Attributes to be set or taken out, by the place of their tag.
     tags: BTreeMap<usize, Vec<(&'static str, Option<String>)>>,
-    /// What elements of a single tag are to hold, by the place of that.
+    /// What stands in place of the `/>` of elements of a single tag, by the place of that.
     filled: BTreeMap<usize, String>,
     pieces: Vec<(Range<usize>, String)>,
 }
@@ -56,11 +56,14 @@ impl<'p> TextEdits<'p> {
     pub(super) fn put_into(&mut self, of: &Element, text: &str) {
         let start = of.range().start;
         let end = tag_end(self.plain, start);
-        self.pieces
-            .push(match self.plain[start..end].ends_with("/>") {
-                true => (end - 2..end, format!(">\n{text}\n</{}>", of.name())),
-                false => (end..end, format!("\n{text}")),
-            });
+        if self.plain[start..end].ends_with("/>") {
+            // its tag may be changed too, and both are one piece
+            self.tags.entry(start).or_default();
+            let inner = format!(">\n{text}\n</{}>", of.name());
+            self.filled.insert(start, inner);
+        } else {
+            self.pieces.push((end..end, format!("\n{text}")));
+        }
     }
 
     /// Puts a text before the end of an element that has one.
@@ -139,6 +142,27 @@ fn with_attribute(tag: &str, name: &str, value: Option<&str>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cft_ident_files::config::xml::XmlTree;
+
+    #[test]
+    fn an_element_of_a_single_tag_takes_an_attribute_and_a_child_at_once() {
+        let text = "<a><b x='1'/></a>";
+        let tree = XmlTree::parse(text).unwrap();
+        let b = tree.root().child("b").unwrap();
+        for child_first in [true, false] {
+            let mut edits = TextEdits::of(text);
+            if child_first {
+                edits.put_into(&b, "<c/>");
+            }
+            edits.set(&b, "x", "2");
+            edits.set(&b, "longer", "3 4 5");
+            if !child_first {
+                edits.put_into(&b, "<c/>");
+            }
+            let wanted = "<a><b x='2' longer=\"3 4 5\">\n<c/>\n</b></a>";
+            assert_eq!(edits.made(text), wanted);
+        }
+    }
 
     #[test]
     fn an_attribute_is_set_in_its_place_or_behind_the_others_or_goes() {

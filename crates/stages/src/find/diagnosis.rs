@@ -364,15 +364,7 @@ impl Diagnosed {
             accept: accept_option(effect, robot),
             deviations: step.deviations,
             shrinkage: step.shrinkage,
-            torque: EffectValueFound {
-                value: step.torque[0],
-                std: Some(step.torque[1]),
-                unit: setup
-                    .file
-                    .torque_unit(effect.place.joint().unwrap_or(0))
-                    .to_owned(),
-                bound: false,
-            },
+            torque: EffectValueFound::of_torque(step.torque, setup.torque_unit_at(effect.place)),
             parts: step.parts.iter().filter_map(part).collect(),
             gain: gain_of_each(robot.joint_names(), &step.gain),
             accepted_by_user: step.accepted_by_user,

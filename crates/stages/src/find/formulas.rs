@@ -44,6 +44,18 @@ pub struct EffectValueFound {
     pub bound: bool,
 }
 
+impl EffectValueFound {
+    /// The torque of an effect with its standard deviation.
+    pub(super) fn of_torque([value, std]: [f64; 2], unit: &str) -> Self {
+        Self {
+            value,
+            std: Some(std),
+            unit: unit.to_owned(),
+            bound: false,
+        }
+    }
+}
+
 /// Numbers of an effect, each with its key.
 pub(crate) fn values_found(
     numbers: Vec<EffectNumber>,
@@ -74,7 +86,7 @@ pub(crate) fn gain_of_each(names: &[String], gain: &ErrorGain) -> Vec<JointGain>
 /// Estimated parameters of an effect with units and standard deviations.
 pub fn numbers_of(setup: &RobotSetup, step: &FoundEffect) -> Vec<EffectNumber> {
     let effect = &step.estimate;
-    let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+    let unit = setup.torque_unit_at(effect.place);
     effect.numbers(&setup.robot, unit, Some(&step.covariance))
 }
 

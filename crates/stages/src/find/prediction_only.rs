@@ -39,19 +39,14 @@ impl Diagnosed {
     pub(super) fn prediction_only(&self, setup: &RobotSetup) -> Vec<PredictionOnly> {
         let of_term = |term: &PredictingTerm| {
             let effect = &self.diagnosis.model.effects[term.written];
-            let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+            let unit = setup.torque_unit_at(effect.place);
             PredictionOnly {
                 effect: effect.name(),
                 joint: effect.place.name(&setup.robot),
                 parameters: values_found(effect.numbers(&setup.robot, unit, None)).collect(),
                 shrinkage: term.shrinkage,
                 deviations: term.deviations,
-                torque: EffectValueFound {
-                    value: term.torque[0],
-                    std: Some(term.torque[1]),
-                    unit: unit.to_owned(),
-                    bound: false,
-                },
+                torque: EffectValueFound::of_torque(term.torque, unit),
                 gain: gain_of_each(setup.robot.joint_names(), &term.gain),
                 holdout_before: term.held_out.map(|h| h[0]),
                 holdout_after: term.held_out.map(|h| h[1]),

@@ -230,7 +230,7 @@ impl Diagnosed {
             };
             let estimated = numbers_of(setup, step);
             let whole = effect.linear == step.estimate.linear;
-            let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+            let unit = setup.torque_unit_at(effect.place);
             let numbers = match whole {
                 true => estimated.clone(),
                 false => effect.numbers(&setup.robot, unit, None),
@@ -252,7 +252,7 @@ impl Diagnosed {
         }
         for term in &self.diagnosis.predicting {
             let effect = &self.diagnosis.model.effects[term.written];
-            let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+            let unit = setup.torque_unit_at(effect.place);
             let numbers = effect.numbers(&setup.robot, unit, None);
             model.effects.push(EffectSection {
                 shrinkage: Some(term.shrinkage),

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::error::IdentifyError;
+use cft_ident_core::effect::EffectPlace;
 use cft_ident_core::friction::estimate::NARROWER;
 use cft_ident_core::motion::{DifferenceFormula, FilterSettings, ParallelFilter, TorqueTiming};
 use cft_ident_core::robot::{JointKind, Robot};
@@ -39,6 +40,11 @@ pub struct RobotSetup {
 }
 
 impl RobotSetup {
+    /// Unit of an effect's torque: that of its joint, of the first where it acts on all.
+    pub fn torque_unit_at(&self, place: EffectPlace) -> &'static str {
+        self.file.torque_unit(place.joint().unwrap_or(0))
+    }
+
     /// Reads a robot file, or one that comes with the tool, such as `configs/cft.toml`.
     ///
     /// # Errors

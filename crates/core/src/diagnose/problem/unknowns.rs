@@ -35,6 +35,12 @@ pub struct FreeParameters {
 }
 
 impl DiagnosisUnknowns {
+    /// By how much each unknown of one model is off that of another.
+    pub fn moved(&self, from: &AugmentedModel, to: &AugmentedModel) -> Vec<f64> {
+        let by = |unknown: &Unknown| value_of(to, *unknown) - value_of(from, *unknown);
+        self.list.iter().map(by).collect()
+    }
+
     /// The unknowns of a model; its inertial parameters are held where these are kept.
     pub fn of(model: &AugmentedModel, open: &FreeParameters, keep: bool) -> Self {
         let plain = &model.model;

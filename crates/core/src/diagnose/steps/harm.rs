@@ -30,17 +30,16 @@ impl EffectJudge<'_> {
             .filter(|i| ways[*i].amplitude.is_some())
             .collect();
         let free: Vec<usize> = set.iter().copied().filter(|i| !ways[*i].accepted).collect();
-        // first beside the given numbers, then beside those that the refit makes of them without an effect
-        let in_use = &self.prepared.case.in_use;
-        if free.is_empty() || self.is_harmless(written)? {
+        if free.is_empty() {
             return Ok(HeldOutVerdict::Harmless);
         }
-        let alone = self.alone()?;
-        let worse = self.worse(&rows, [&alone, written])?;
-        let charged = worse.is_some();
-        let Some(worse) = worse.or(self.worse(&rows, [in_use, written])?) else {
+        // first beside the given numbers, then beside those that the refit makes of them without an effect
+        let Some(than_given) = self.worse(&rows, [&self.prepared.case.in_use, written])? else {
             return Ok(HeldOutVerdict::Harmless);
         };
+        let than_refit = self.worse(&rows, [&self.alone()?, written])?;
+        let charged = than_refit.is_some();
+        let worse = than_refit.unwrap_or(than_given);
         let all: Vec<&PendingEffect> = set.iter().map(|i| &ways[*i]).collect();
         let with = self.based(self.fitted(&all));
         let joints = self.prepared.case.given.model.robot.joint_names();

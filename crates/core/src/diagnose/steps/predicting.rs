@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::{EffectJudge, FittedEffect, PendingEffect, StepResult};
+use super::{EffectJudge, FittedEffect, PendingEffect, StepResult, give_amplitudes};
 use crate::diagnose::candidates::{candidates, no_finding};
 use crate::diagnose::outcome::{JudgedEffects, NotWritten, PredictingTerm};
 use crate::diagnose::prepared::{PreparedCase, SummedProducts};
@@ -57,8 +57,8 @@ pub fn write_for_prediction(
     let mut summed = prepared.summed_over(about, &list, (&directions, &blocks))?;
     let held = summed.sums.split_off(fitted.len());
     hold_bodies(&mut summed.declared, &prepared.unknowns, &summed.about);
-    let chosen = prepared.field(&list, &summed).that_predict(watch)?;
-    let mut terms: Vec<PendingEffect> = chosen.into_iter().map(pending).collect();
+    let chosen = prepared.field(&list, &summed).choose_predicting(watch)?;
+    let mut terms: Vec<PendingEffect> = chosen.into_iter().map(PendingEffect::of).collect();
     if terms.is_empty() {
         return Ok(named);
     }
@@ -74,12 +74,13 @@ pub fn write_for_prediction(
         work.keep_what_predicts(&mut terms)?;
     }
     let errors = work.held_out_errors(&terms, &held);
-    let whole = SummedProducts {
-        sums: summed.sums.followed_by(held),
-        ..summed.clone()
-    };
     // blocks that are set aside are of the fitted logs: asked, they are fitted with the others
+    let whole;
     if !case.roles.contains(&LogRole::Holdout) {
+        whole = SummedProducts {
+            sums: summed.sums.followed_by(held),
+            ..summed.clone()
+        };
         work.field = prepared.field(&list, &whole);
     }
     work.with_terms(terms, errors, named)
@@ -88,19 +89,6 @@ pub fn write_for_prediction(
 /// Whether two effects are of one law at one place.
 fn same_place(a: &ModelEffect, b: &ModelEffect) -> bool {
     a.name() == b.name() && a.place == b.place
-}
-
-fn pending(chosen: ChosenCandidate) -> PendingEffect {
-    PendingEffect {
-        chosen,
-        accepted: false,
-        found: None,
-        left: None,
-        came_back: false,
-        amplitude: None,
-        change: None,
-        without: None,
-    }
 }
 
 impl PreparedCase<'_> {
@@ -133,15 +121,7 @@ impl EffectJudge<'_> {
                 }
             }
             if leaves.is_empty() {
-                for term in terms.iter_mut() {
-                    term.amplitude = None;
-                }
-                for i in set {
-                    let part = part_of(&terms[i]);
-                    let found = terms[i].found.as_ref();
-                    terms[i].amplitude =
-                        found.map(|f| f.effect.linear.iter().map(|x| part * x).collect());
-                }
+                give_amplitudes(terms, part_of);
                 return Ok(estimates);
             }
             leaves.sort_by(|a, b| a.2.total_cmp(&b.2));
@@ -314,7 +294,7 @@ impl EffectJudge<'_> {
         let beside = self.fitted(&stand);
         let unknowns = &self.prepared.unknowns;
         let mut model = named.proposed.clone();
-        let mut by = moved(unknowns, &self.field.summed.about, &beside);
+        let mut by = unknowns.moved(&self.field.summed.about, &beside);
         for (by, unknown) in by.iter_mut().zip(&unknowns.list) {
             let place = |t: &&PendingEffect| self.field.effect(&t.chosen).place;
             let of_term = |j: usize| stand.iter().any(|t| place(t).touches(j));
@@ -342,15 +322,14 @@ impl EffectJudge<'_> {
         // what a named effect is drawn beside has the terms too
         for found in &mut named.steps {
             if let (Some(without), Some(place)) = (&mut found.without, found.written) {
-                let by = moved(unknowns, &named.written, without);
+                let by = unknowns.moved(&named.written, without);
                 *without = written.clone();
                 step(without, unknowns, &by);
                 without.effects.remove(place);
             }
         }
-        for (shift, by) in
-            (named.to_estimate.iter_mut()).zip(moved(unknowns, &proposed, &named.proposed))
-        {
+        let moved = unknowns.moved(&proposed, &named.proposed);
+        for (shift, by) in named.to_estimate.iter_mut().zip(moved) {
             *shift += by;
         }
         let own = self.prediction();
@@ -375,12 +354,6 @@ impl EffectJudge<'_> {
         (named.proposed, named.written) = (proposed, written);
         named
     }
-}
-
-/// How much the unknowns of one model are off those of another.
-fn moved(unknowns: &DiagnosisUnknowns, from: &AugmentedModel, to: &AugmentedModel) -> Vec<f64> {
-    let by = |u: &Unknown| value_of(to, *u) - value_of(from, *u);
-    unknowns.list.iter().map(by).collect()
 }
 
 /// Holds the bodies of a model; the friction of each joint moves beside a term on it, and does not come to push.

@@ -16,7 +16,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
         let (mut dissolved, mut kept) = (Vec::new(), Vec::new());
         for index in 0..self.layout.bodies.len() {
             let body = &self.layout.bodies[index];
-            let (element, pose) = (body.element, body.pose);
+            let (element, pose, is_bare) = (body.element, body.pose, body.frames.is_empty());
             let around: Vec<Vec<Element>> = [&body.frames]
                 .into_iter()
                 .chain(body.joints.iter().map(|joint| &joint.frames))
@@ -42,7 +42,7 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
                     _ => self.align(index, k - 1, class),
                 }
             }
-            if body_is_bare(&around) && self.layout.is_misread(&element) {
+            if is_bare && self.layout.is_misread(&element) {
                 self.place(&element, &pose, None);
             }
             let inertial = element.child("inertial");
@@ -83,9 +83,4 @@ impl<'p, 't> SourceWriting<'_, 't, 'p> {
             self.edits.set(&joint.element, "class", class);
         }
     }
-}
-
-/// Whether no frame stands around a body, whose frames are the first of these.
-fn body_is_bare(around: &[Vec<Element>]) -> bool {
-    around.first().is_none_or(Vec::is_empty)
 }

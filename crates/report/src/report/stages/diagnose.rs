@@ -204,7 +204,7 @@ fn numbered(terminal: &mut Writer, setup: &RobotSetup, (number, step): (usize, &
     let sure = format!(
         "{}: torque {} (rms, 95 % CI), {}",
         grade(step),
-        torque(setup, step),
+        torque(setup, &step.estimate, step.torque),
         certainty(step)
     );
     let lines = [sure, gain];

@@ -4,7 +4,7 @@ use super::step_words::{alternatives, certainty, grade, in_words, titled, torque
 use crate::report::Writer;
 use crate::report::sections::effects;
 use crate::report::table::Columns;
-use cft_ident_core::diagnose::{Diagnosis, FoundEffect, PredictingTerm};
+use cft_ident_core::diagnose::{Diagnosis, FoundEffect};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, RobotSetup};
 use cft_ident_stages::replay::ReplayedDiagnosis;
@@ -32,7 +32,9 @@ pub(super) fn show(
         .words("parameters", |step| in_words(setup, step))
         .percent("gain on blocks left out", |step| step.share)
         .words("grade", grade)
-        .words("torque (rms, 95 % CI)", |step| torque(setup, step))
+        .words("torque (rms, 95 % CI)", |step| {
+            torque(setup, &step.estimate, step.torque)
+        })
         .words("certainty", certainty);
     page.table_if_any(columns);
     prediction_only(page, setup, d);
@@ -40,23 +42,19 @@ pub(super) fn show(
 
 /// What is written for prediction alone, term by term.
 pub(super) fn prediction_only(writer: &mut Writer, setup: &RobotSetup, d: &Diagnosis) {
-    let unit = |term: &PredictingTerm| {
-        let joint = term.estimate.place.joint().unwrap_or(0);
-        setup.file.torque_unit(joint)
-    };
     let caption = "written for prediction only, none of them sure by itself: the part of the fitted torque that is written, \
                    and the torque error of the joint on held-out data without and with the term";
     let columns = Columns::new(caption, &d.predicting)
         .words("term", |term| term.estimate.title(&setup.robot))
         .percent("written", |term| term.shrinkage)
         .words("torque (rms, 95 % CI)", |term| {
-            let [torque, std] = term.torque;
-            format!("{} {}", number::plus_minus(torque, 1.96 * std), unit(term))
+            torque(setup, &term.estimate, term.torque)
         })
         .words("held-out error", |term| match term.held_out {
             Some(errors) => {
                 let [without, with] = errors.map(|e| number::significant(e, 3));
-                format!("{without} to {with} {}", unit(term))
+                let unit = setup.torque_unit_at(term.estimate.place);
+                format!("{without} to {with} {unit}")
             }
             None => number::ABSENT.to_owned(),
         });

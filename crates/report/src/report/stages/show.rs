@@ -187,10 +187,10 @@ fn friction(to: &mut Writer, of: &ShowReport) {
 
 fn effects(terminal: &mut Writer, of: &ShowReport) {
     let robot = &of.setup.robot;
-    let said = of.model.effects.iter().map(|effect| {
-        let joint = effect.place.joint().unwrap_or(0);
-        escape(&effect.said_and_named(robot, of.setup.file.torque_unit(joint)))
-    });
+    let said =
+        of.model.effects.iter().map(|effect| {
+            escape(&effect.said_and_named(robot, of.setup.torque_unit_at(effect.place)))
+        });
     let said: Vec<String> = said.collect();
     if !said.is_empty() {
         terminal.line("");

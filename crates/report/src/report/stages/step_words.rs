@@ -58,11 +58,8 @@ pub(super) fn certainty(step: &FoundEffect) -> String {
 }
 
 /// The torque that an effect makes, root mean square, with its 95 % CI.
-pub(super) fn torque(setup: &RobotSetup, step: &FoundEffect) -> String {
-    let [torque, std] = step.torque;
-    let unit = setup
-        .file
-        .torque_unit(step.estimate.place.joint().unwrap_or(0));
+pub(super) fn torque(setup: &RobotSetup, effect: &ModelEffect, [torque, std]: [f64; 2]) -> String {
+    let unit = setup.torque_unit_at(effect.place);
     format!("{} {unit}", number::plus_minus(torque, 1.96 * std))
 }
 
@@ -73,7 +70,7 @@ pub(super) fn seen(setup: &RobotSetup, step: &FoundEffect) -> Option<String> {
         format!(
             "seen: {} {}, {} of the squared error; `{option}`",
             step.estimate.title(&setup.robot),
-            torque(setup, step),
+            torque(setup, &step.estimate, step.torque),
             number::percent(step.share.max(0.0)),
         )
     })
@@ -81,7 +78,7 @@ pub(super) fn seen(setup: &RobotSetup, step: &FoundEffect) -> Option<String> {
 
 /// The name of an effect where it was found.
 pub(super) fn titled(setup: &RobotSetup, effect: &ModelEffect) -> String {
-    let unit = setup.file.torque_unit(effect.place.joint().unwrap_or(0));
+    let unit = setup.torque_unit_at(effect.place);
     effect.said_and_named(&setup.robot, unit)
 }
 

@@ -47,7 +47,10 @@ struct AdmittedCandidate {
 
 impl Field<'_> {
     /// Chooses what predicts: in every turn the best of each joint, until none takes what one asks of it.
-    pub(super) fn that_predict(&self, watch: DiagnosisWatch) -> StepResult<Vec<ChosenCandidate>> {
+    pub(super) fn choose_predicting(
+        &self,
+        watch: DiagnosisWatch,
+    ) -> StepResult<Vec<ChosenCandidate>> {
         let of_model = &self.summed.about.effects;
         let own = |i: &usize| {
             let effect = &self.candidates[*i].effect;
