@@ -449,7 +449,11 @@ pub(super) fn warnings(simulated: &simulate::SimulationSummary) -> Vec<String> {
         let share = number::percent(*share);
         format!("the amplifier of {name} saturates in {share} of the samples")
     });
-    limits.chain(saturated).collect()
+    let left_out = simulated.left_out.iter();
+    let left_out = left_out.map(|why| {
+        format!("left out of the simulation, for it is written for prediction only and no machine can have it: {why}")
+    });
+    limits.chain(saturated).chain(left_out).collect()
 }
 
 /// Range and root mean square of every channel of the log.

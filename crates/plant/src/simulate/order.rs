@@ -43,6 +43,8 @@ pub struct SimulationSummary {
     pub ending: RunEnding,
     /// Share of the rows at which each motor channel is saturated, by coordinate.
     pub saturated: Vec<(String, f64)>,
+    /// Effects of the model that are there for prediction alone and that no machine can have, with why.
+    pub left_out: Vec<String>,
 }
 
 /// A simulated log in memory.
@@ -57,6 +59,8 @@ pub struct SimulatedLog {
     pub ending: RunEnding,
     /// Share of the rows at which each motor channel is saturated, by coordinate.
     pub saturated: Vec<(String, f64)>,
+    /// Effects of the model that are there for prediction alone and that no machine can have, with why.
+    pub left_out: Vec<String>,
 }
 
 impl SimulatedLog {
@@ -140,6 +144,7 @@ pub fn simulate_from(
         limits: simulated.limits,
         ending: simulated.ending,
         saturated: simulated.saturated,
+        left_out: simulated.left_out,
     })
 }
 
@@ -183,7 +188,7 @@ fn run_order<const J: usize>(
         temperatures: warm.clone(),
         ..RobotSites::of(&plant)?
     };
-    let (effects, effect_values) = built_effects(order, &sites)?;
+    let (effects, effect_values, left_out) = built_effects(order, &sites)?;
     let mechanism = &plant.mechanism;
     let mut settings = settings_file::settings(order.robot, mechanism)?;
     settings.seconds = order.seconds.unwrap_or(SECONDS);
@@ -240,6 +245,7 @@ fn run_order<const J: usize>(
         saturated: run.coordinates.iter().cloned().zip(shares).collect(),
         ending: run.ending,
         limits: run.limits,
+        left_out,
     })
 }
 
@@ -288,12 +294,12 @@ fn drive<const J: usize>(
     Ok((MotorInput::Volts(series), seconds))
 }
 
-/// Effects of the model, then those of the order.
+/// Effects of the model, then those of the order; what of the model is left out, and why.
 fn built_effects(
     order: &Order,
     sites: &RobotSites,
-) -> Result<(PlantEffects, Vec<EffectValue>), SimulateError> {
-    let mut asked = Vec::new();
+) -> Result<(PlantEffects, Vec<EffectValue>, Vec<String>), SimulateError> {
+    let (mut asked, mut left_out) = (Vec::new(), Vec::new());
     if let Some((file, model)) = order.model {
         for (place, effect) in model.effects.iter().enumerate() {
             let values = effect.parameters.iter();
@@ -305,15 +311,21 @@ fn built_effects(
             }
             .or_own(&model.candidates);
             // Tried alone, so that what is wrong with it is said of the file and not of the command line.
-            PlantEffects::build(std::slice::from_ref(&spec), sites).map_err(|source| {
-                SimulateError::ModelEffect {
-                    file: file.to_owned(),
-                    number: place + 1,
-                    name: effect.name.clone(),
-                    source: Box::new(source),
+            match PlantEffects::build(std::slice::from_ref(&spec), sites) {
+                Ok(_) => asked.push(spec),
+                // what is no statement on the machine need not be possible on one
+                Err(source @ SimulateError::EffectNumber { .. }) if effect.prediction_only => {
+                    left_out.push(source.to_string());
                 }
-            })?;
-            asked.push(spec);
+                Err(source) => {
+                    return Err(SimulateError::ModelEffect {
+                        file: file.to_owned(),
+                        number: place + 1,
+                        name: effect.name.clone(),
+                        source: Box::new(source),
+                    });
+                }
+            }
         }
     }
     asked.extend(order.effects.iter().cloned());
@@ -325,7 +337,7 @@ fn built_effects(
             place: "this log".to_owned(),
             why: ErrorText::new("the robot file's [log] has the motors' channels alone, and faults of the data sit in joint channels").remedy("let [log] read those"),
         }),
-        _ => Ok((effects, values)),
+        _ => Ok((effects, values, left_out)),
     }
 }
 

@@ -352,6 +352,7 @@ impl ServoRun {
             limits: Vec::new(),
             ending: RunEnding::Completed,
             saturated: Vec::new(),
+            left_out: Vec::new(),
         }
     }
 

@@ -320,6 +320,40 @@ fn effects_of_a_model_run_as_those_of_the_command_line_do() {
 }
 
 #[test]
+fn what_is_written_for_prediction_only_need_not_be_possible_on_a_machine() {
+    let robot = robot();
+    // a load that is heavier than the whole joint leaves nothing to its motor
+    let loose = |prediction_only: bool| EffectSection {
+        prediction_only,
+        ..effect(
+            "backlash-impact",
+            Some("q4"),
+            &[("gap", 0.01), ("inertia", 1e3)],
+        )
+    };
+    let run = |effects: Vec<EffectSection>| {
+        let plant = CftTruth::synthetic(LaboratorySetup::Tuedacs).plant();
+        let model = model(&robot, plant.expect("a pose").parameters(), effects);
+        simulate(&Order {
+            robot: &robot,
+            model: Some(("m.toml", &model)),
+            experiment: Experiment::Usual,
+            seconds: Some(0.2),
+            effects: Vec::new(),
+            seed: 2,
+        })
+    };
+    let ripple = || effect("ripple", Some("q4"), &[]);
+    let left = run(vec![loose(true), ripple()]).expect("runs");
+    let whole = run(vec![ripple()]).expect("runs");
+    assert_eq!(left.values, whole.values);
+    assert_eq!(left.left_out.len(), 1);
+    assert!(left.left_out[0].contains("backlash-impact"));
+    let refused = run(vec![loose(false), ripple()]).expect_err("refused");
+    assert!(refused.to_string().contains("[[effect]] 1"));
+}
+
+#[test]
 fn faults_need_a_log_with_joint_channels() {
     let text = std::fs::read_to_string(format!("{}/configs/cft.toml", cft_ident_support::ROOT))
         .expect("the robot file");
