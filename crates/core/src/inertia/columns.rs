@@ -66,6 +66,14 @@ pub struct KnownFriction {
 }
 
 impl KnownFriction {
+    /// The same law with its deviations so much wider that rows which tell it decide alone.
+    pub fn doubted(mut self) -> Self {
+        const WIDER: f64 = 1e3;
+        let covariance = self.covariance.iter_mut().flatten();
+        covariance.for_each(|x| *x *= WIDER * WIDER);
+        self
+    }
+
     /// Whether a refinement moves any of its parameters.
     pub fn moves(&self) -> bool {
         self.held.contains(&false)

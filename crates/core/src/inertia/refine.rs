@@ -8,9 +8,10 @@
 //! enters with its covariance, as rows of unit noise.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::accumulate::{BlockFactors, RelativeResidual};
-use super::columns::{GRADIENT, JointTerm, RegressorColumns};
+use super::columns::{GRADIENT, JointTerm, KnownFriction, RegressorColumns};
 use super::solution::{FitError, FitInputs, PriorRows};
 use super::solve::{Fit, RowWeighting, fit, fit_with, least_square, weights_of};
 use crate::math::descent::{IterationEnding, StepControl, Trial, descend};
@@ -27,6 +28,10 @@ const DAMPING: StepControl = StepControl::damping(10.0, 10.0, [1e-9, 1e6]);
 const FARTHEST: f64 = 4.0;
 /// No slope is steeper than this over the rms speed: tanh is a sign there.
 const STEEPEST: f64 = 1e4;
+
+/// A friction that was known is contradicted where chance moves it that far less often: three deviations. Half of it in
+/// deviations: one right file in eight; twice: a law that bends is held to where its slow logs put it.
+const CONTRADICTED: f64 = 0.0027;
 
 /// A refined fit.
 #[derive(Debug, Clone)]
@@ -68,6 +73,29 @@ impl RefinedFit {
         Ok((fit(&rows, RowWeighting::Wls)?, rows.in_one_block()))
     }
 
+    /// Joints whose friction the rows move further from where `before` knew it than [`CONTRADICTED`].
+    ///
+    /// # Errors
+    /// [`FitError`].
+    pub fn contradicted(&self, before: &RegressorColumns) -> Result<Vec<usize>, FitError> {
+        let mut joints = Vec::new();
+        for (j, (known, now)) in before.known.iter().zip(&self.columns.known).enumerate() {
+            let (Some(known), Some(now)) = (known, now) else {
+                continue;
+            };
+            let [now, old] = [now, known].map(|known| known.law.parameters());
+            let directions = whitened(known)?;
+            let off = |row: &[f64; GRADIENT]| -> f64 {
+                (0..GRADIENT).map(|k| row[k] * (now[k] - old[k])).sum()
+            };
+            let square: f64 = directions.iter().map(|row| off(row).powi(2)).sum();
+            if square > 0.0 && chance(directions.len(), square) < CONTRADICTED {
+                joints.push(j);
+            }
+        }
+        Ok(joints)
+    }
+
     /// What the unknowns of [`Self::factors`] lack to those of [`Self::fit`]: the laws as they stand.
     pub fn shift(&self) -> DVector<f64> {
         let mut shift = DVector::zeros(self.fit.theta.len());
@@ -87,7 +115,31 @@ fn add_laws(columns: &RegressorColumns, theta: &mut DVector<f64>) {
     }
 }
 
-/// Rows L (phi - phi_0) of the friction that was known before, L'L the inverse of its covariance, times root `strength`.
+/// How often chance gives as large a sum of so many squares.
+fn chance(freedom: usize, square: f64) -> f64 {
+    ChiSquared::new(freedom as f64).map_or(1.0, |of| of.sf(square))
+}
+
+/// A row of L (phi - phi_0) for each direction that the covariance of a known friction holds, L'L its inverse.
+fn whitened(known: &KnownFriction) -> Result<Vec<[f64; GRADIENT]>, FitError> {
+    let size: [f64; GRADIENT] = std::array::from_fn(|k| known.covariance[k][k].max(0.0).sqrt());
+    // correlations, so that parameters of all units compare
+    let scaled = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| match size[a] * size[b] {
+        s if s > 0.0 => known.covariance[a][b] / s,
+        _ => 0.0,
+    });
+    let svd = rank::svd(&scaled)?;
+    let row = |(i, s): (usize, &f64)| {
+        std::array::from_fn(|k| match size[k] > 0.0 {
+            true => svd.v[(k, i)] / (size[k] * s.sqrt()),
+            false => 0.0,
+        })
+    };
+    let held = svd.s.iter().enumerate().filter(|(_, s)| **s > 1e-10);
+    Ok(held.map(row).collect())
+}
+
+/// Rows of the friction that was known before, times root `strength`.
 fn prior(
     before: &RegressorColumns,
     now: &RegressorColumns,
@@ -100,18 +152,11 @@ fn prior(
         let (Some(known), Some(present)) = (known, &now.known[j]) else {
             continue;
         };
-        let size: [f64; GRADIENT] = std::array::from_fn(|k| known.covariance[k][k].max(0.0).sqrt());
-        // correlations, so that parameters of all units compare
-        let scaled = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| match size[a] * size[b] {
-            s if s > 0.0 => known.covariance[a][b] / s,
-            _ => 0.0,
-        });
-        let svd = rank::svd(&scaled)?;
         let [now, before] = [present, known].map(|known| known.law.parameters());
-        for (i, s) in svd.s.iter().enumerate().filter(|(_, s)| **s > 1e-10) {
+        for direction in whitened(known)? {
             let mut row = vec![0.0; u + 1];
-            for (at, k) in free.law_unknowns(j).filter(|(_, k)| size[*k] > 0.0) {
-                row[at] = (strength / s).sqrt() * svd.v[(k, i)] / size[k];
+            for (at, k) in free.law_unknowns(j) {
+                row[at] = strength.sqrt() * direction[k];
                 row[u] += row[at] * (before[k] - now[k]);
             }
             rows.push(row);
@@ -332,7 +377,6 @@ fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> Regr
 #[cfg(test)]
 mod tests {
     use super::super::BLOCK_SECONDS;
-    use super::super::columns::KnownFriction;
     use super::super::law_start::begin;
     use super::*;
     use rand::{RngExt, SeedableRng};

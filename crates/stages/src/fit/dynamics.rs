@@ -118,10 +118,10 @@ impl IdentifiedDynamics {
         };
         let (count, errors) = judged.essential;
         let estimate = judged.estimate;
-        let fit = estimate.fit;
         let mut inputs = rows.inputs();
         let known = problem.before.as_ref().zip(problem.friction_file());
-        let friction_prior = known.map(|(before, file)| before.kept(file, &inputs));
+        let friction_prior = known.map(|(before, file)| before.kept(file, &estimate, &inputs));
+        let fit = estimate.fit;
         // what a fit has among its unknowns is no friction beside them
         let beside = estimate.columns.known.iter().any(Option::is_some);
         let friction = known

@@ -96,6 +96,8 @@ pub struct InertialEstimate {
     pub fit: Fit,
     /// Covariance of the unknowns and of the known friction of each joint, in this order.
     pub covariance: DMatrix<f64>,
+    /// Joints whose known friction the rows contradict, and whose own rows are left out.
+    pub contradicted: Vec<usize>,
     /// What noise of the positions makes of the unknowns, where that is known.
     pub bias: Option<DVector<f64>>,
     pub basis: FitRows,
@@ -173,14 +175,14 @@ pub fn estimate(
     let shown = &mut account;
     let moves = columns.known.iter().flatten().any(KnownFriction::moves);
     let holds = !moves && columns.known.iter().any(Option::is_some);
-    let mut columns = columns;
+    let (mut columns, mut contradicted) = (columns, Vec::new());
     if moves && estimator != EstimatorKind::Oe {
         let found = with_known_friction(rows, columns, shown)?;
         if estimator == EstimatorKind::Wls {
             return Ok(InertialEstimate { account, ..found });
         }
         // rows weighted otherwise inform the inertias alone; the friction stays as it was refined
-        columns = found.columns;
+        (columns, contradicted) = (found.columns, found.contradicted);
     }
     let (mut fit, mut basis, solver) = match estimator {
         // nothing of a law that is held is left to search: its fit is linear
@@ -211,19 +213,32 @@ pub fn estimate(
         covariance: with_friction(&columns, &fit),
         columns,
         fit,
+        contradicted,
         bias,
         basis,
         account,
     })
 }
 
-/// Refines the known friction with the inertias, drawn to it by its covariance; the fit left is of the inertias.
+/// Refines the known friction with the inertias, drawn to it by its covariance but where the rows contradict it; the fit
+/// left is of the inertias.
 fn with_known_friction(
     rows: &mut LsqRows,
     mut columns: RegressorColumns,
     account: &mut EstimatorAccount,
 ) -> Result<InertialEstimate, IdentifyError> {
-    let refined = refinement(rows, columns.clone(), account)?;
+    let mut refined = refinement(rows, columns.clone(), account)?;
+    let contradicted = refined.contradicted(&columns)?;
+    if !contradicted.is_empty() {
+        for j in &contradicted {
+            let (known, found) = (&mut columns.known[*j], &refined.columns.known[*j]);
+            *known = found.clone().map(KnownFriction::doubted);
+        }
+        let first = account.clone();
+        refined = refinement(rows, columns.clone(), account)?;
+        account.iterations += first.iterations;
+        account.joints = first.joints;
+    }
     let (mut fit, sums) = refined.without_laws()?;
     let (laws, free) = (
         refined.columns.known.clone(),
@@ -251,6 +266,7 @@ fn with_known_friction(
         columns,
         fit,
         covariance,
+        contradicted,
         bias: None,
         basis: FitRows::in_one_block(&sums, u),
         account: account.clone(),

@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::robot_setup::RobotSetup;
-use crate::note::{FrictionNote, StageNote};
+use super::estimate::InertialEstimate;
+use crate::note::{FrictionNote, NumberWithStd, StageNote};
 use cft_ident_core::friction::estimate::curve_std;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::solve::Fit;
@@ -117,12 +118,52 @@ impl FrictionBefore {
         Ok(before)
     }
 
-    /// As a model file keeps it after a fit of the logs `inputs` that took it from `file`.
-    pub fn kept(&self, file: &ModelFile, inputs: &[Provenance]) -> Vec<FrictionPrior> {
-        match self.known.iter().any(KnownFriction::moves) {
-            true => refined_by(self.priors.clone(), inputs),
-            false => file.friction_prior.clone(),
+    /// As a model file keeps it after a fit of the logs `inputs` that took it from `file`; what the fit contradicts is no
+    /// prior.
+    pub fn kept(
+        &self,
+        file: &ModelFile,
+        estimate: &InertialEstimate,
+        inputs: &[Provenance],
+    ) -> Vec<FrictionPrior> {
+        if !self.known.iter().any(KnownFriction::moves) {
+            return file.friction_prior.clone();
         }
+        let mut priors = refined_by(self.priors.clone(), inputs);
+        for j in &estimate.contradicted {
+            if let Some(now) = &estimate.columns.known[*j] {
+                priors[*j].values = Some(now.law.parameters());
+                priors[*j].covariance = Some(self.known[*j].clone().doubted().covariance);
+            }
+        }
+        priors
+    }
+
+    /// What these logs contradict of it.
+    pub fn contradictions(&self, setup: &RobotSetup, estimate: &InertialEstimate) -> Vec<StageNote> {
+        let after = self.after(setup, &estimate.columns, &estimate.covariance);
+        let of = |j: &usize| {
+            let FrictionOfFit { joint, parameters } = &after[*j];
+            let moved = DoubleTanh::NAMES.into_iter().filter_map(|name| {
+                let p = parameters.get(name)?;
+                let before = NumberWithStd {
+                    value: p.prior,
+                    std: p.prior_std?,
+                };
+                let now = NumberWithStd {
+                    value: p.value,
+                    std: p.std?,
+                };
+                Some((name, [before, now], p.unit.clone()))
+            });
+            StageNote::Friction {
+                joint: joint.clone(),
+                note: FrictionNote::Contradicted {
+                    moved: moved.collect(),
+                },
+            }
+        };
+        estimate.contradicted.iter().map(of).collect()
     }
 
     /// The friction of every joint as a fit leaves it in `columns`; `all` is the covariance of unknowns and friction.
@@ -264,8 +305,9 @@ pub(crate) fn before_these(
         let prior = prior_of((name, file), &joint, given)?;
         let keys = DoubleTanh::NAMES.map(|key| format!("{key}:{joint}"));
         let changed = file.double_tanh(name, &joint)?.parameters();
+        let flat = file.covariance_of(&keys);
         if let (Some(values), Some(covariance)) = (prior.values, prior.covariance)
-            && values != changed
+            && (values != changed || flat != covariance.as_flattened())
         {
             model.replace_covariance(&keys, &|a, b| covariance[a][b]);
             for parameter in &mut model.parameters {

@@ -38,7 +38,7 @@ pub(crate) fn lsq_notes(
     let failed = judged.not_consistent.then_some(FitNote::NotConsistent);
     let resting = rests(setup, &estimate.basis.sums.resting_shares());
     notes.extend(failed.into_iter().chain(resting).map(StageNote::Fit));
-    notes.extend(friction_beyond(problem, judged)?);
+    notes.extend(doubts_of_friction(problem, judged)?);
     let doubts = confounded(&estimate.fit, &judged.unknowns);
     let doubts = bridged.into_iter().chain(doubts);
     let of_numbers = doubts.chain(negative(&judged.unknowns));
@@ -61,8 +61,9 @@ fn of_method(problem: &LsqProblem, judged: &JudgedEstimate) -> impl Iterator<Ite
         .chain(problem.friction_of_reduced())
 }
 
-/// Joints that move faster than in the logs of their friction; none where the fit has the friction among its unknowns.
-fn friction_beyond(
+/// Joints whose known friction the logs contradict, and those that move faster than in the logs of their friction; none
+/// where the fit has the friction among its unknowns.
+fn doubts_of_friction(
     problem: &LsqProblem,
     judged: &JudgedEstimate,
 ) -> Result<Vec<StageNote>, IdentifyError> {
@@ -75,8 +76,10 @@ fn friction_beyond(
     let Some(before) = problem.before.as_ref().filter(|_| beside) else {
         return Ok(Vec::new());
     };
-    let fastest = problem.data.top_speeds()?;
-    Ok(before.beyond(&problem.data.setup, columns, covariance, &fastest))
+    let (setup, fastest) = (&problem.data.setup, problem.data.top_speeds()?);
+    let mut notes = before.contradictions(setup, &judged.estimate);
+    notes.extend(before.beyond(setup, columns, covariance, &fastest));
+    Ok(notes)
 }
 
 impl EstimatorAccount {

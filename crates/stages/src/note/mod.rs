@@ -149,6 +149,10 @@ pub enum FrictionNote {
     LowerBound { parameter: &'static str, above: f64 },
     /// The data do not determine a parameter.
     NotDetermined { parameter: &'static str },
+    /// The logs of a fit contradict the friction that was known before; its parameters with their units, before and after.
+    Contradicted {
+        moved: Vec<(&'static str, [NumberWithStd; 2], String)>,
+    },
     /// The joint moves faster than in its one-joint logs \[`unit`/s\].
     FasterThanLogged {
         speed: f64,

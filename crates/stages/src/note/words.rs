@@ -5,7 +5,7 @@ mod model;
 
 use std::fmt::{Display, Formatter, Result};
 
-use super::{FrictionNote, LogNote, RowLoss, SetupNote, StageNote, TrackNote};
+use super::{FrictionNote, LogNote, NumberWithStd, RowLoss, SetupNote, StageNote, TrackNote};
 use crate::setup::{FoundTorqueLimit, FrictionPower};
 use cft_ident_core::math::descent::IterationEnding;
 use cft_ident_core::number::{clock, percent, significant};
@@ -251,6 +251,21 @@ impl Display for FrictionNote {
                 f,
                 "these data cannot determine {parameter}; log slower reversals and more speeds"
             ),
+            Self::Contradicted { moved } => {
+                let number = |n: &NumberWithStd| {
+                    format!("{} ± {}", significant(n.value, 4), significant(n.std, 2))
+                };
+                let moved = listed(moved, |(name, [before, after], unit)| {
+                    let unit = format!(" {unit}");
+                    let (before, after) = (number(before), number(after));
+                    format!("{name} {before} before, {after}{} here", unit.trim_end())
+                });
+                write!(
+                    f,
+                    "these logs contradict its friction by more than three deviations: {moved}; they alone tell it in this \
+                     fit: log the joint alone at all speeds at which it is used"
+                )
+            }
             Self::FasterThanLogged {
                 speed,
                 logged,
@@ -297,7 +312,7 @@ impl Display for TrackNote {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::note::{FitNote, ModelNote, NumberWithStd};
+    use crate::note::{FitNote, ModelNote};
     use cft_ident_core::friction::plateau::MissedPlateau;
 
     #[test]
