@@ -194,12 +194,8 @@ fn a_fit_of_the_logs_that_refined_the_friction_begins_at_the_prior_and_counts_no
 
 #[test]
 fn a_prior_made_from_the_logs_that_are_fitted_is_left_out() {
-    // sure and wrong, as it would be where the same rows made it before
-    let small = covariance().map(|row| row.map(|x| 1e-8 * x));
-    let mut model = known(drawn(10), small);
+    let mut model = known(drawn(10), covariance());
     let inputs = fitted(&model, 11, EstimatorKind::Wls).inputs;
-    let held = after(&fitted(&model, 11, EstimatorKind::Wls));
-    assert!((held[0][0] - LAW[0]).abs() > 10.0 * held[0][1]);
     model.friction_prior = vec![FrictionPrior {
         joint: "q1".to_owned(),
         logs: inputs,
@@ -209,6 +205,46 @@ fn a_prior_made_from_the_logs_that_are_fitted_is_left_out() {
     for (k, [value, std]) in found.into_iter().enumerate() {
         assert!((value - LAW[k]).abs() < 4.0 * std, "{k}: {value} {std}");
     }
+}
+
+/// Whether a fit says that its logs contradict the friction that was known.
+fn contradicts(found: &IdentifiedDynamics) -> bool {
+    let mut all = found.notes.iter().map(ToString::to_string);
+    all.any(|note| {
+        note.contains("these logs contradict its friction by more than three deviations")
+    })
+}
+
+#[test]
+fn friction_that_the_logs_contradict_is_no_prior_in_this_fit_nor_in_those_after_it() {
+    // sure and wrong, as a law is that slow logs leave open
+    let small = covariance().map(|row| row.map(|x| 1e-4 * x));
+    let model = known(drawn(10), small);
+    let found = fitted(&model, 11, EstimatorKind::Wls);
+    assert!(contradicts(&found));
+    for (k, [value, std]) in after(&found).into_iter().enumerate() {
+        assert!((value - LAW[k]).abs() < 4.0 * std, "{k}: {value} {std}");
+    }
+    // what the file had is said beside what was found
+    let viscous = &found.friction[0].parameters["viscous"];
+    assert!((viscous.prior - model.parameters[0].value).abs() < 1e-12);
+    let written = found.model(&machine(), Some(&model));
+    let written = ModelFile::parse("model.toml", &written.to_toml().unwrap()).unwrap();
+    let again = fitted(&written, 11, EstimatorKind::Wls);
+    assert!(!contradicts(&again));
+    for (a, b) in after(&found).into_iter().zip(after(&again)) {
+        assert!((a[0] - b[0]).abs() < 0.1 * a[1], "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn friction_that_is_as_sure_as_it_says_is_not_contradicted() {
+    // of 24 draws of .0027 two come in 0.2 % of all tests
+    let wrong = (0..24_u64).filter(|seed| {
+        let model = known(drawn(200 + seed), covariance());
+        contradicts(&fitted(&model, 40 + seed, EstimatorKind::Wls))
+    });
+    assert!(wrong.count() <= 1);
 }
 
 #[test]

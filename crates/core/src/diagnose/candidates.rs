@@ -9,10 +9,11 @@ use crate::effect::{
 use crate::judge::Bound;
 use crate::number;
 
-/// Whether two effects may not both be added: one shape per family and place, and one wave per order.
+/// Whether two effects may not both be added: one shape per family and place, one wave per order, and one constant torque.
 pub fn exclude(a: &ModelEffect, b: &ModelEffect) -> bool {
     let waves = |e: &ModelEffect| e.law.entry.search == ShapeSearch::Orders;
-    match a.place == b.place && a.family() == b.family() {
+    let holds = |e: &ModelEffect| e.law.entry.families.contains(&Family::Offset);
+    match a.place == b.place && (a.family() == b.family() || holds(a) && holds(b)) {
         true if waves(a) && waves(b) => a.name() == b.name() && one_wave(&a.shape, &b.shape),
         same => same,
     }

@@ -1,30 +1,37 @@
-//! Chosen effects in their best shape: Gauss-Newton over shapes, amplitudes and the declared unknowns together, a small
-//! pass over the rows for each step.
+//! Chosen effects in their best shape: damped Gauss-Newton steps over shapes, amplitudes and the declared unknowns
+//! together, a small pass over the rows for each. The unknowns in which the torque is linear are solved anew at every
+//! point, so that the shapes and the slopes of friction laws alone are searched (variable projection: Golub and Pereyra
+//! 1973). What a step minimises, squares and prior, is what it is accepted by.
 
 use nalgebra::DVector;
 
 use super::candidates::{EffectCandidate, refined_shapes};
 use super::prepared::{PreparedCase, SummedProducts, moved};
+use super::problem::unknowns::Unknown;
 use super::search::ChosenCandidate;
 use crate::effect::{AugmentedModel, ModelEffect};
 use crate::judge::Term;
+use crate::math::descent::{StepControl, Trial, descend};
 use crate::motion::MotionError;
+use crate::robot::model::JointFriction;
 
-const STEPS: usize = 6;
-/// A step that takes less than this part off the squares is the last.
+/// Most steps that are tried, each a pass over the rows: what has not ended by then hardly moves.
+const MOST_STEPS: usize = 24;
+/// A step that takes less than this part off the cost is the last.
 const SETTLED: f64 = 1e-5;
-/// Times that a step is halved where it makes the fit worse.
-const HALVED: usize = 4;
+/// Damping of the steps.
+const DAMPING: StepControl = StepControl::damping(10.0, 10.0, [1e-9, 1e3]);
 
 /// A fit of chosen effects in some shape.
 struct Point {
     summed: SummedProducts,
     candidates: Vec<EffectCandidate>,
-    /// Of the declared unknowns, then of every coefficient.
+    /// Of the declared unknowns, then of every coefficient; slopes of friction laws stay.
     values: DVector<f64>,
-    squares: f64,
-    /// Of every shape that is refined: where to go from here.
-    step: Vec<f64>,
+    /// Weighted squares and what the prior takes.
+    cost: f64,
+    /// How every shape that is refined moves the torque.
+    slopes: Vec<Term>,
 }
 
 impl PreparedCase<'_> {
@@ -45,21 +52,28 @@ impl PreparedCase<'_> {
             }
         }
         let start = self.there(&list, chosen, &values, &[]);
-        let mut best = self.point(summed.about.clone(), start, (chosen, directions))?;
-        for _ in 0..STEPS {
-            let Some(next) = self.better(&best, chosen, directions)? else {
-                break;
-            };
-            let settled = best.squares - next.squares <= SETTLED * best.squares;
-            best = next;
-            if settled {
-                break;
-            }
-        }
+        let begun = self.point(summed.about.clone(), start, (chosen, directions))?;
+        let mut step = |from: &Point, damping: f64| {
+            let values = self.step_from(from, chosen, damping);
+            let about = moved(&from.summed.about, &self.unknowns, &values);
+            let by: Vec<f64> = values.iter().skip(from.values.len()).copied().collect();
+            let list = self.there(&from.candidates, chosen, &values, &by);
+            let next = self.point(about, list, (chosen, directions))?;
+            let gained = from.cost - next.cost;
+            Ok::<_, MotionError>(match gained > 0.0 {
+                true if gained <= SETTLED * from.cost => Trial::Last(next),
+                true => Trial::Accepted(next),
+                false if gained >= -SETTLED * from.cost => Trial::Settled,
+                false => Trial::Rejected,
+            })
+        };
+        let (best, _, _) = descend(begun, &DAMPING, MOST_STEPS, &mut step)?;
         for c in chosen {
             let found = &best.candidates[c.candidate];
             let own = &mut candidates[c.candidate];
             own.effect.shape.clone_from(&found.effect.shape);
+            // by which the slopes of its torque go
+            own.effect.linear.clone_from(&found.effect.linear);
             own.slopes.clone_from(&found.slopes);
             for (k, room) in &found.slopes {
                 own.effect.held[*k] = room.least == 0.0 || room.most == 0.0;
@@ -68,25 +82,28 @@ impl PreparedCase<'_> {
         Ok(best.summed)
     }
 
-    /// A step on; none where no part of it makes the fit better.
-    fn better(
-        &self,
-        from: &Point,
-        chosen: &[ChosenCandidate],
-        directions: &[ModelEffect],
-    ) -> Result<Option<Point>, MotionError> {
-        let about = moved(&from.summed.about, &self.unknowns, &from.values);
-        let mut part = 1.0;
-        for _ in 0..HALVED {
-            let step: Vec<f64> = from.step.iter().map(|x| part * x).collect();
-            let list = self.there(&from.candidates, chosen, &from.values, &step);
-            let next = self.point(about.clone(), list, (chosen, directions))?;
-            if next.squares < from.squares {
-                return Ok(Some(next));
+    /// Unknowns in which the torque is not linear.
+    fn bent(&self) -> Vec<usize> {
+        let friction = &self.fitted.model.model.friction;
+        let bends = |unknown: &Unknown| match unknown {
+            Unknown::Friction { joint, k } => {
+                matches!(friction[*joint], JointFriction::DoubleTanh(_)) && *k >= 3
             }
-            part *= 0.5;
-        }
-        Ok(None)
+            _ => false,
+        };
+        let list = self.unknowns.list.iter().enumerate();
+        list.filter(|(_, unknown)| bends(unknown))
+            .map(|(i, _)| i)
+            .collect()
+    }
+
+    /// The damped step of all unknowns: those of the model, the coefficients, the shapes.
+    fn step_from(&self, from: &Point, chosen: &[ChosenCandidate], damping: f64) -> DVector<f64> {
+        let field = self.field(&from.candidates, &from.summed);
+        let all = field.terms(chosen).with(&from.slopes);
+        let mut bent = self.bent();
+        bent.extend(from.values.len()..all.len());
+        all.fit_damped(&field.total(), (&bent, damping)).values
     }
 
     /// Candidates with the amplitudes of a fit, a step on.
@@ -130,14 +147,17 @@ impl PreparedCase<'_> {
         let directions: Vec<ModelEffect> = directions.iter().map(present).collect();
         let summed = self.summed(about, &candidates, &directions)?;
         let field = self.field(&candidates, &summed);
-        let (total, terms) = (field.total(), field.terms(chosen));
-        let fit = terms.fit(&total, &[]);
+        let terms = field.terms(chosen);
+        let held: Vec<(usize, f64)> = self.bent().into_iter().map(|i| (i, 0.0)).collect();
+        let fit = terms.fit(&field.total(), &held);
         let slopes = |c: &ChosenCandidate| summed.layout.slopes[c.candidate].clone();
-        let slopes: Vec<Term> = chosen.iter().flat_map(slopes).collect();
-        let all = terms.with(&slopes).fit(&total, &[]).values;
+        let known = self
+            .case
+            .prior
+            .cost(&self.unknowns, (&summed.about, &fit.values));
         Ok(Point {
-            squares: terms.weigh(&fit.squares),
-            step: all.iter().skip(terms.len()).copied().collect(),
+            cost: terms.weigh(&fit.squares) + known,
+            slopes: chosen.iter().flat_map(slopes).collect(),
             values: fit.values,
             summed,
             candidates,

@@ -40,7 +40,7 @@ pub fn diagnose(
     watch.unless_stopped()?;
     let searched = prepared.search(watch)?;
     watch.unless_stopped()?;
-    let judged = judge(&prepared, &searched)?;
+    let (searched, judged) = prepared.judged(searched, watch)?;
     refuse_failed(&prepared, &judged)?;
     watch.unless_stopped()?;
     let mut asked = (searched, judged);
@@ -75,7 +75,34 @@ fn check(case: &DiagnosisCase, split: &DataSplit) -> Result<(), DiagnoseError> {
     Ok(())
 }
 
+/// Most times that shapes are fitted anew because effects left.
+const SETTLINGS: usize = 3;
+
 impl PreparedCase<'_> {
+    /// Judges what was chosen, its shapes fitted anew without what left, until nothing more leaves.
+    fn judged(
+        &self,
+        mut searched: SearchedCase,
+        watch: DiagnosisWatch,
+    ) -> Result<(SearchedCase, JudgedEffects), DiagnoseError> {
+        let mut judged = judge(self, &searched)?;
+        for _ in 0..SETTLINGS {
+            watch.unless_stopped()?;
+            let Some(again) = self.without_those_that_left(&searched, &judged.steps)? else {
+                break;
+            };
+            let stand = |of: &JudgedEffects| -> Vec<bool> {
+                of.steps.iter().map(|s| s.written.is_some()).collect()
+            };
+            let before = stand(&judged);
+            (judged, searched) = (judge(self, &again)?, again);
+            if stand(&judged) == before {
+                break;
+            }
+        }
+        Ok((searched, judged))
+    }
+
     fn evaluate(
         &self,
         searched: &SearchedCase,

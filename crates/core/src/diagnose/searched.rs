@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::candidates::{EffectCandidate, NotTried, candidates, exclude, is_friction_law};
 use super::error::DiagnoseError;
+use super::outcome::FoundEffect;
 use super::prepared::{PreparedCase, SummedProducts};
 use super::problem::case::AcceptedEffect;
 use super::problem::fit::{declared_terms, determines_some};
@@ -15,8 +16,20 @@ use super::tables::EffectEstimates;
 use super::watch::DiagnosisWatch;
 use crate::effect::{AugmentedModel, ModelEffect};
 use crate::explain::ErrorText;
-use crate::judge::{BlockSums, TimeBlock, compare, weighted};
+use crate::judge::{BlockSums, Bound, TimeBlock, compare, weighted};
 use crate::motion::{MotionError, Stretch};
+
+/// Coefficients that a law can do without and that are within so many deviations of nil.
+fn needless(step: &FoundEffect, deviations: f64) -> impl Iterator<Item = usize> {
+    let effect = &step.estimate;
+    let (first, size) = (effect.shape.len(), effect.parameters());
+    (0..effect.linear.len()).filter(move |k| {
+        let key = effect.law.entry.key(effect.law.linear[*k]);
+        let variance = step.covariance[(first + k) * (size + 1)];
+        let within = effect.linear[*k].powi(2) <= deviations * deviations * variance;
+        key.is_some_and(|key| key.optional) && within
+    })
+}
 
 /// What the search came to.
 pub struct SearchedCase {
@@ -168,6 +181,53 @@ impl PreparedCase<'_> {
             looked,
             directions,
         })
+    }
+
+    /// The same with the shapes that those effects want which stand, now that the others left, and without numbers that a
+    /// law can do without and these data do not show; none where that moves nothing.
+    pub fn without_those_that_left(
+        &self,
+        searched: &SearchedCase,
+        judged: &[FoundEffect],
+    ) -> Result<Option<SearchedCase>, MotionError> {
+        let mut candidates = searched.candidates.clone();
+        let chosen = searched.chosen.iter().zip(judged);
+        let standing: Vec<_> = chosen.filter(|(_, step)| step.written.is_some()).collect();
+        let bends = |c: &ChosenCandidate| !searched.candidates[c.candidate].slopes.is_empty();
+        let mut moves =
+            standing.len() < judged.len() && standing.iter().any(|(chosen, _)| bends(chosen));
+        for (chosen, step) in &standing {
+            let EffectCandidate { bounds, effect, .. } = &mut candidates[chosen.candidate];
+            for k in needless(step, self.case.numbers.screen) {
+                moves |= bounds[k] != Bound::NIL;
+                bounds[k] = Bound::NIL;
+                effect.held[step.estimate.shape.len() + k] = true;
+            }
+        }
+        if !moves {
+            return Ok(None);
+        }
+        let standing: Vec<ChosenCandidate> = standing.iter().map(|(c, _)| (*c).clone()).collect();
+        let directions = &searched.directions;
+        let found = self.polished(&mut candidates, &searched.summed, &standing, directions)?;
+        let mut asked = candidates.clone();
+        for (i, candidate) in asked.iter_mut().enumerate() {
+            if !searched.chosen.iter().any(|c| c.candidate == i) {
+                candidate.clear_columns();
+            }
+        }
+        let summed = self.summed(found.about, &asked, directions)?;
+        Ok(Some(SearchedCase {
+            noisier: Some(self.noisier(&summed, &asked)?),
+            summed,
+            candidates,
+            chosen: searched.chosen.clone(),
+            not_tried: searched.not_tried.clone(),
+            looked: searched.looked.clone(),
+            directions: directions.clone(),
+            error: searched.error,
+            determined: searched.determined,
+        }))
     }
 
     /// Friction laws in their best shape that are sure, with no amplitude.

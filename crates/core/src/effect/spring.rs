@@ -4,11 +4,12 @@ use super::{Entry, Family, Key, Law, Rule, ShapeSearch, ShapeSpan, SpeedLadder, 
 
 pub static ENTRY: Entry = Entry {
     name: "spring",
-    families: &[Family::Position],
+    // where its rest point lies is a constant torque
+    families: &[Family::Position, Family::Offset],
     keys: &[
         Key::size("k", Unit::Stiffness),
         Key::shape("q0", Unit::Position),
-        Key::size("k3", Unit::Cubic),
+        Key::size("k3", Unit::Cubic).or_zero(),
     ],
     search: ShapeSearch::Refined,
     must: &[Rule::not_negative(

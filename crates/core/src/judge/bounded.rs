@@ -10,6 +10,12 @@ pub struct Bound {
 }
 
 impl Bound {
+    /// 0 alone.
+    pub const NIL: Bound = Bound {
+        least: 0.0,
+        most: 0.0,
+    };
+
     /// Any value.
     pub const NONE: Bound = Bound {
         least: f64::NEG_INFINITY,

@@ -178,6 +178,24 @@ impl Terms {
         }
     }
 
+    /// Fits all terms to joints' sums, some of them kept near 0 by so many parts of their own diagonal.
+    pub(crate) fn fit_damped(
+        &self,
+        sums: &[DMatrix<f64>],
+        (damped, damping): (&[usize], f64),
+    ) -> TermFit {
+        let (mut normal, right) = self.firmed(sums);
+        for i in damped {
+            normal[(*i, *i)] *= 1.0 + damping;
+        }
+        let bounds: Vec<Bound> = self.list.iter().map(|t| t.bound).collect();
+        let values = bounded::solve(&normal, &right, &bounds);
+        TermFit {
+            squares: self.squares(sums, &values),
+            values,
+        }
+    }
+
     /// Information matrix of the terms: that of joints' sums and of what is known beforehand, in weighted rows.
     pub(crate) fn information(&self, sums: &[DMatrix<f64>]) -> DMatrix<f64> {
         self.firmed(sums).0

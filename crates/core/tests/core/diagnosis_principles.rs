@@ -149,6 +149,21 @@ fn effects_of_every_kind_are_named_and_measured() {
     assert_eq!(written(&found), ["spring"]);
     near(value(&found, "spring", "k"), 0.9, 0.02);
 
+    // with no offset declared it holds the constant torque too, which is no friction that differs by direction
+    let mut case = case(
+        &one_joint(1.0),
+        logs(&|_, [q, ..]| 0.9 * (q - 0.2) - 0.3),
+        0.02,
+    );
+    case.given.model.offset = vec![0.0];
+    case.in_use.model.offset = vec![0.0];
+    case.prior.centre.model.offset = vec![0.0];
+    case.open.offset = vec![false];
+    let found = diagnosed(&case);
+    assert_eq!(written(&found), ["spring"]);
+    near(value(&found, "spring", "k"), 0.9, 0.02);
+    near(value(&found, "spring", "q0"), 0.2, 0.03);
+
     // a spring that bends is no constant torque wherever it is at rest
     let spring = |_: f64, [q, ..]: [f64; 3]| 0.9 * (q - 0.2) + 1.5 * (q - 0.2).powi(3);
     let (_, found) = of(&spring);

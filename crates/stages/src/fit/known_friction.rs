@@ -5,10 +5,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+use super::estimate::InertialEstimate;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::robot_setup::RobotSetup;
-use super::estimate::InertialEstimate;
 use crate::note::{FrictionNote, NumberWithStd, StageNote};
 use cft_ident_core::friction::estimate::curve_std;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
@@ -140,7 +140,11 @@ impl FrictionBefore {
     }
 
     /// What these logs contradict of it.
-    pub fn contradictions(&self, setup: &RobotSetup, estimate: &InertialEstimate) -> Vec<StageNote> {
+    pub fn contradictions(
+        &self,
+        setup: &RobotSetup,
+        estimate: &InertialEstimate,
+    ) -> Vec<StageNote> {
         let after = self.after(setup, &estimate.columns, &estimate.covariance);
         let of = |j: &usize| {
             let FrictionOfFit { joint, parameters } = &after[*j];

@@ -56,4 +56,18 @@ impl ParameterPrior {
         let pull = &information * DVector::from_iterator(u, off);
         (information, pull)
     }
+
+    /// What it takes for values of the unknowns about a model, in weighted squares.
+    pub(crate) fn cost(
+        &self,
+        unknowns: &DiagnosisUnknowns,
+        (model, values): (&AugmentedModel, &DVector<f64>),
+    ) -> f64 {
+        let (information, _) = self.over(unknowns, model);
+        let off =
+            |(x, value): (&Unknown, &f64)| value_of(model, *x) + value - value_of(&self.centre, *x);
+        let off = unknowns.list.iter().zip(values).map(off);
+        let off = DVector::from_iterator(unknowns.len(), off);
+        off.dot(&(information * &off))
+    }
 }

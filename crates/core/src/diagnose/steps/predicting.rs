@@ -362,10 +362,7 @@ fn hold_bodies(declared: &mut Terms, unknowns: &DiagnosisUnknowns, about: &Augme
         match unknown {
             Unknown::Theta(_) => {
                 term.columns.clear();
-                term.bound = Bound {
-                    least: 0.0,
-                    most: 0.0,
-                };
+                term.bound = Bound::NIL;
                 if i < declared.prior.1.len() {
                     declared.prior.0.row_mut(i).fill(0.0);
                     declared.prior.0.column_mut(i).fill(0.0);
