@@ -120,7 +120,9 @@ impl IdentifiedDynamics {
         let estimate = judged.estimate;
         let mut inputs = rows.inputs();
         let known = problem.before.as_ref().zip(problem.friction_file());
-        let friction_prior = known.map(|(before, file)| before.kept(file, &estimate, &inputs));
+        let friction_prior = known.map(|(before, file)| {
+            before.kept(file, (&estimate.columns, &estimate.contradicted), &inputs)
+        });
         let fit = estimate.fit;
         // what a fit has among its unknowns is no friction beside them
         let beside = estimate.columns.known.iter().any(Option::is_some);

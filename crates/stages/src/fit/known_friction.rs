@@ -5,7 +5,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-use super::estimate::InertialEstimate;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
 use crate::input::robot_setup::RobotSetup;
@@ -123,15 +122,15 @@ impl FrictionBefore {
     pub fn kept(
         &self,
         file: &ModelFile,
-        estimate: &InertialEstimate,
+        (columns, contradicted): (&RegressorColumns, &[usize]),
         inputs: &[Provenance],
     ) -> Vec<FrictionPrior> {
         if !self.known.iter().any(KnownFriction::moves) {
             return file.friction_prior.clone();
         }
         let mut priors = refined_by(self.priors.clone(), inputs);
-        for j in &estimate.contradicted {
-            if let Some(now) = &estimate.columns.known[*j] {
+        for j in contradicted {
+            if let Some(now) = &columns.known[*j] {
                 priors[*j].values = Some(now.law.parameters());
                 priors[*j].covariance = Some(self.known[*j].clone().doubted().covariance);
             }
@@ -143,9 +142,10 @@ impl FrictionBefore {
     pub fn contradictions(
         &self,
         setup: &RobotSetup,
-        estimate: &InertialEstimate,
+        (columns, all): (&RegressorColumns, &DMatrix<f64>),
+        contradicted: &[usize],
     ) -> Vec<StageNote> {
-        let after = self.after(setup, &estimate.columns, &estimate.covariance);
+        let after = self.after(setup, columns, all);
         let of = |j: &usize| {
             let FrictionOfFit { joint, parameters } = &after[*j];
             let moved = DoubleTanh::NAMES.into_iter().filter_map(|name| {
@@ -167,7 +167,7 @@ impl FrictionBefore {
                 },
             }
         };
-        estimate.contradicted.iter().map(of).collect()
+        contradicted.iter().map(of).collect()
     }
 
     /// The friction of every joint as a fit leaves it in `columns`; `all` is the covariance of unknowns and friction.

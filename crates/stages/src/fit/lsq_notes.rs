@@ -70,6 +70,7 @@ fn doubts_of_friction(
     let InertialEstimate {
         columns,
         covariance,
+        contradicted,
         ..
     } = &judged.estimate;
     let beside = columns.known.iter().any(Option::is_some);
@@ -77,7 +78,7 @@ fn doubts_of_friction(
         return Ok(Vec::new());
     };
     let (setup, fastest) = (&problem.data.setup, problem.data.top_speeds()?);
-    let mut notes = before.contradictions(setup, &judged.estimate);
+    let mut notes = before.contradictions(setup, (columns, covariance), contradicted);
     notes.extend(before.beyond(setup, columns, covariance, &fastest));
     Ok(notes)
 }
