@@ -107,6 +107,12 @@ fn place(
             let Some(column) = log.find(channel).filter(|column| known[*column].is_none()) else {
                 continue;
             };
+            // of a controller's law the commands of all joints stand behind one another
+            let (j, law) = (j % layout.joints.len(), layout.section.torque.is_some());
+            let role = match role {
+                ChannelRole::Torque if law => ChannelRole::Command,
+                role => role,
+            };
             let joint = &layout.joints[j];
             let kind = match raw {
                 true => setup.robot.coordinate_kind(j),
@@ -117,6 +123,9 @@ fn place(
                 ChannelRole::Velocity => format!("{position}/s"),
                 ChannelRole::Torque if raw => "V".to_owned(),
                 ChannelRole::Torque => setup.file.torque_unit(j).to_owned(),
+                ChannelRole::Command if channel.unit.is_empty() => {
+                    setup.file.torque_unit(j).to_owned()
+                }
                 _ => position.to_owned(),
             };
             let name = &log.names()[column];

@@ -23,7 +23,7 @@ use cft_ident_report::report::stages;
 use cft_ident_report::report::stages::identify::ShownLogs;
 use cft_ident_stages::identify::{
     self, Dataset, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction,
-    IdentifySettings, Log, LogData, RobotSetup, StageEnd, Validated,
+    IdentifyError, IdentifySettings, Log, LogData, RobotSetup, StageEnd, Validated,
 };
 use cft_ident_stages::replay::ReplayedDiagnosis;
 use cft_ident_stages::setup::Finding;
@@ -200,10 +200,20 @@ impl IdentifyJob {
         };
         let data = Dataset::read(&setup, &logs_of(all), &context.control)?;
         data.check_moving()?;
-        let logs = held_out::parted(all);
+        let is_usable = |spec: &LogSpec| {
+            let of = logs_of(std::slice::from_ref(spec));
+            let part = LogData::read_all(&setup, &of, &[&data.logs], &context.control);
+            let found =
+                part.and_then(|part| identify::has_stretch(&setup, &part, &context.control));
+            match found {
+                // the whole log is read by now: what keeps a part from a fit is its place
+                Err(error) if !matches!(error, IdentifyError::Interrupted) => Ok(false),
+                found => Ok(found?),
+            }
+        };
+        let logs = held_out::parted(all, &is_usable)?;
         if logs.validation.is_empty() {
-            let text =
-                "no part of a log is held out: the error on data that were not fitted is not known";
+            let text = "no part of a log is held out, for none is long enough for the filter beside the rest: the error on data that were not fitted is not known";
             warnings.push(text.to_owned());
         }
         let of = file_name(file);

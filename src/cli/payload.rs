@@ -10,7 +10,7 @@ use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::table::{CellAlignment, Table};
 use cft_ident_report::report::{FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline};
 use cft_ident_stages::identify::{
-    self, Dataset, IntervalNumber, Payload, PayloadReading, PayloadVerdict,
+    self, CarriedSpan, Dataset, IntervalNumber, Payload, PayloadReading, PayloadVerdict,
 };
 use cft_ident_tool::tool::{CarriedBody, RobotController};
 
@@ -155,6 +155,11 @@ fn report(found: &Payload, logs: &str) -> Report {
             "no payload; one above the upper end of the interval would show",
             None,
         ),
+        PayloadVerdict::Unexplained => (
+            "not certain",
+            "no payload is seen, and the model leaves many times its usual error: something else acts on the arm, or it is another one",
+            Some("Next: `cft-ident inspect` and `cft-ident diagnose` of this log."),
+        ),
         PayloadVerdict::NotDetermined => (
             "not determined",
             "these data do not show the mass",
@@ -165,6 +170,10 @@ fn report(found: &Payload, logs: &str) -> Report {
         grade,
         text: text.to_owned(),
     }];
+    findings.extend(found.carried.iter().map(|span| FoundLine {
+        grade: "carried",
+        text: carried(span),
+    }));
     findings.extend(found.readings.iter().filter_map(made_worse));
     all.found(findings);
     if let Some(next) = next {
@@ -176,6 +185,21 @@ fn report(found: &Payload, logs: &str) -> Report {
     all.line("");
     all.table(errors);
     report
+}
+
+/// When the load is carried, in words.
+fn carried(span: &CarriedSpan) -> String {
+    let at = |t: f64| number::significant(t, 4);
+    let when = match (span.from_s, span.to_s) {
+        (Some(from), Some(to)) => format!("from {} to {} s", at(from), at(to)),
+        (Some(from), None) => format!("from {} s to the end", at(from)),
+        (None, Some(to)) => format!("from the beginning to {} s", at(to)),
+        (None, None) => "throughout".to_owned(),
+    };
+    format!(
+        "{when} of {}, and not in the rest of the logs; all numbers are those of the load while it is carried",
+        escape(&span.log)
+    )
 }
 
 /// Whether the mass with free gains is above zero.

@@ -75,5 +75,6 @@ mod temperature;
 mod track;
 mod two_arms;
 mod watch;
+mod within_a_log;
 mod writers_readers;
 mod written_angles;

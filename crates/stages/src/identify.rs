@@ -47,7 +47,7 @@ pub use crate::fit::lsq_problem::LsqSettings;
 pub use crate::fit::motion_fit::MotionFit;
 pub use crate::fit::payload::payload;
 pub use crate::fit::payload_result::{
-    GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
+    CarriedSpan, GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
 };
 pub use crate::fit::weakest::WeakestPart;
 pub use crate::fleet::reduce::reduce;
@@ -73,7 +73,7 @@ pub use crate::input::gain_error::GainError;
 pub use crate::input::in_memory::{InMemory, read_whole};
 pub use crate::input::in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use crate::input::log::Log;
-pub use crate::input::log_data::LogData;
+pub use crate::input::log_data::{LogData, has_stretch};
 pub use crate::input::model::{new_model, refined, refined_or_friction};
 pub use crate::input::position_cutoff::PositionCutoff;
 pub use crate::input::reduced::{

@@ -216,7 +216,31 @@ impl RobotFile {
                     ..position.clone()
                 };
             }
-            layout.conversion = asked.pd.of(layout.torques.len()).map(of_controller);
+            let joints = robot.joint_names();
+            layout.conversion = (asked.pd.of(joints.len()))
+                .map(|gains| of_controller(gains, asked.velocity_command.is_some()));
+            let further = asked.further().flat_map(|(key, column)| {
+                let each = layout.positions.iter().zip(joints).enumerate();
+                each.map(move |(place, (position, joint))| {
+                    let named = Channel {
+                        wrap: None,
+                        offset: 0.0,
+                        column: column.of(place, joint),
+                        key: Some(format!("[log] torque.{key}")),
+                        ..position.clone()
+                    };
+                    match key {
+                        "feed_forward" => Channel {
+                            unit: String::new(),
+                            factor: position.factor.signum(),
+                            ..named
+                        },
+                        _ => named,
+                    }
+                })
+            });
+            let further: Vec<Channel> = further.collect();
+            layout.torques.extend(further);
         }
         if !self.log.gears.is_empty() {
             let offsets = layout.positions.iter_mut();
@@ -228,11 +252,8 @@ impl RobotFile {
 
     /// Columns of the commands of joints, and the keys that name them.
     fn commands(&self, asked: &ControllerTorque, joints: &[String]) -> Vec<(String, String)> {
-        let of_joint = |joint: &String| match &asked.command {
-            Some(command) => (
-                command.replace("{joint}", joint),
-                "[log] torque.command".to_owned(),
-            ),
+        let of_joint = |(place, joint): (usize, &String)| match &asked.command {
+            Some(command) => (command.of(place, joint), "[log] torque.command".to_owned()),
             None => {
                 let own = self.log.joint.get(joint);
                 let reference = own.and_then(|own| own.reference.clone());
@@ -242,7 +263,7 @@ impl RobotFile {
                 )
             }
         };
-        joints.iter().map(of_joint).collect()
+        joints.iter().enumerate().map(of_joint).collect()
     }
 
     fn actuator_layout(&self) -> Layout {
@@ -315,17 +336,22 @@ fn to_joint_side(setup: LaboratorySetup) -> RowConversion {
 }
 
 /// Commands in the places of torques to the torques that a controller with these gains asked for; it cannot where
-/// velocities are wanted and the log has none.
-fn of_controller(gains: Vec<[f64; 2]>) -> RowConversion {
+/// velocities are wanted and the log has none. Behind the commands of the positions stand those of the velocities,
+/// where `with_speeds` says so, and the torques that the controller adds, where there are more numbers.
+fn of_controller(gains: Vec<[f64; 2]>, with_speeds: bool) -> RowConversion {
     RowConversion::new(move |positions, torques, velocities| {
+        let n = gains.len();
+        let (torques, further) = torques.split_at_mut(n.min(torques.len()));
+        let (speeds, added) = further.split_at(if with_speeds { n.min(further.len()) } else { 0 });
+        let number = |of: &[f64], j: usize| of.get(j).copied().unwrap_or(0.0);
         for (j, torque) in torques.iter_mut().enumerate() {
             let [kp, kd] = gains[j];
             let damped = match velocities.get(j) {
-                Some(velocity) => kd * velocity,
+                Some(velocity) => kd * (number(speeds, j) - velocity),
                 None if kd == 0.0 => 0.0,
                 None => return false,
             };
-            *torque = kp * (*torque - positions[j]) - damped;
+            *torque = kp * (*torque - positions[j]) + damped + number(added, j);
         }
         true
     })

@@ -142,16 +142,15 @@ fn controller(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigErr
             ));
         }
     }
-    if asked
-        .command
-        .as_ref()
-        .is_some_and(|c| joints.len() > 1 && !c.contains("{joint}"))
-    {
-        return Err(document.value(
-            &["log", "torque", "command"],
-            "is one column for several joints",
-            "write {joint} where the name of the joint stands",
-        ));
+    let command = asked.command.iter().map(|column| ("command", column));
+    for (key, column) in command.chain(asked.further()) {
+        if !column.fits(joints.len()) {
+            return Err(document.value(
+                &["log", "torque", key],
+                "is not a column for each joint",
+                "write {joint} where the name of the joint stands, or a list of the columns of all joints",
+            ));
+        }
     }
     Ok(())
 }

@@ -322,18 +322,29 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
     ];
     let commands = layout.section.torque.is_some();
     let each = kinds.into_iter().flat_map(|(channels, role, saturates)| {
-        let joints = channels.iter().zip(&layout.joints);
-        joints.map(move |(channel, joint)| InspectedChannel {
-            saturates,
-            delivers: match role {
-                ChannelRole::Torque if !volts => layout.torque_limit(joint),
-                _ => None,
-            },
-            commands: commands && role == ChannelRole::Torque,
-            factor: channel.factor,
-            zero: channel.offset,
-            ..InspectedChannel::new(&channel.column, role, Some(joint), None)
-        })
+        let joints = channels.iter().zip(layout.joints.iter().cycle());
+        joints
+            .enumerate()
+            .map(move |(place, (channel, joint))| InspectedChannel {
+                saturates,
+                delivers: match role {
+                    ChannelRole::Torque if !volts => layout.torque_limit(joint),
+                    _ => None,
+                },
+                commands: commands && role == ChannelRole::Torque,
+                factor: channel.factor,
+                zero: channel.offset,
+                // what a controller adds may be 0 throughout
+                ..InspectedChannel::new(
+                    &channel.column,
+                    match place < layout.joints.len() {
+                        true => role,
+                        false => ChannelRole::Command,
+                    },
+                    Some(joint),
+                    None,
+                )
+            })
     });
     each.collect()
 }

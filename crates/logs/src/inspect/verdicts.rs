@@ -266,7 +266,7 @@ fn jitter(judge: &LogJudge, clock: &ClockFacts, rows: EvenRows, draft: &mut Faul
         return;
     }
     let rate = match in_bursts {
-        true => 1.0 / mean,
+        true => rate_of_bursts(seen.rows as f64, seen.duration(), clock),
         false => 1.0 / even.step_s,
     };
     let rate = round_within(rate, 0.01 * rate);
@@ -288,6 +288,14 @@ fn jitter(judge: &LogJudge, clock: &ClockFacts, rows: EvenRows, draft: &mut Faul
     let fault = (Error, FaultKind::IrregularClock, None);
     draft.of_log(fault, seen.rows, effect, &remedy);
     draft.found.even_rate_hz = Some(rate);
+}
+
+/// The rate of so many rows that come in bursts: those of a burst over the time from one burst to the next \[Hz\].
+fn rate_of_bursts(rows: f64, duration_s: f64, clock: &ClockFacts) -> f64 {
+    let pauses = clock.gaps.len() as f64;
+    let of_burst = rows / (pauses + 1.0);
+    let between = (duration_s - (of_burst - 1.0) * clock.dt) / pauses.max(1.0);
+    of_burst / between
 }
 
 fn often(times: usize, what: &str) -> String {

@@ -103,7 +103,7 @@ pub fn words(name: &str) -> Vec<NameWord> {
 /// Words that make a command of whatever they stand in; an arm that leads is no measurement of the one that follows.
 const COMMANDS: &str = "\
     ref refs reference cmd cmds command commands commanded des desired target setpoint goal \
-    wanted sp leader master operator teleop action actions ctrl soll sollwert setp demand ip";
+    wanted sp leader master operator teleop action actions ctrl soll sollwert setp demand ip ff feedforward";
 
 /// Words of what is about a channel and no channel itself.
 const ASIDE: &str = "\
@@ -194,7 +194,12 @@ pub fn is_command(words: &[NameWord]) -> bool {
         "pos" => pair[0].text == "as",
         _ => false,
     };
-    has(words, COMMANDS) || words.windows(2).any(|pair| desired(pair) || out(pair))
+    let ahead = |pair: &[NameWord]| [&*pair[0].text, &*pair[1].text] == ["feed", "forward"];
+    let pairs = words.windows(2);
+    has(words, COMMANDS)
+        || pairs
+            .into_iter()
+            .any(|pair| desired(pair) || out(pair) || ahead(pair))
 }
 
 /// Whether words are of what is about a channel and no channel itself, or of the tool and no joint.

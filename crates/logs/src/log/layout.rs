@@ -136,7 +136,8 @@ pub struct Layout {
     pub time: Channel,
     /// Positions in joint order.
     pub positions: Vec<Channel>,
-    /// Torques in joint order; empty: the log need not have any and the blocks have none.
+    /// Torques in joint order; empty: the log need not have any and the blocks have none. Behind one of each joint
+    /// may stand more of which the conversion makes those.
     pub torques: Vec<Channel>,
     /// Velocities in joint order; read only where the log has all of them.
     pub velocities: Vec<Channel>,

@@ -51,7 +51,7 @@ pub use names::{escape, escape_whole, nearest};
 pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
 pub use section::{
-    ActuatorChannels, ChannelChoice, ColumnDelimiter, ColumnName, ControllerGains,
+    ActuatorChannels, ChannelChoice, ColumnDelimiter, ColumnName, ColumnsOfJoints, ControllerGains,
     ControllerTorque, JointChannels, LogSection, RowFault, StampSource, TimeUnit, TorqueIs,
     TorqueSign,
 };

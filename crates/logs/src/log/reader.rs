@@ -364,11 +364,12 @@ impl Reader {
         let rows = block.len();
         block.t.push(0.0);
         let at_q = block.q.len();
+        let before = ends(block);
         self.pass.rows.append(block)?;
         for (place, unwrap) in &mut self.turning {
             unwrap.take(block.q[at_q + *place]);
         }
-        block.truncate(rows);
+        cut_off(block, rows, before);
         Ok(())
     }
 
@@ -377,19 +378,20 @@ impl Reader {
         if block.is_empty() {
             block.line0 = self.pass.rows.number();
         }
+        let (rows, before) = (block.len(), ends(block));
+        let [at_q, at_tau, at_dq] = before;
         block.t.push(t);
-        let (at_q, at_tau, at_dq) = (block.q.len(), block.tau.len(), block.dq.len());
         self.pass.rows.append(block)?;
         let logged = [&block.q[at_q..], &block.tau[at_tau..], &block.dq[at_dq..]];
         if self.held.repeats(logged) {
-            block.truncate(block.len() - 1);
+            cut_off(block, rows, before);
             return Ok(());
         }
         let mut t = t;
         if let Some(even) = &mut self.even {
             t = even.take(t);
             if self.failed.has(t) {
-                block.truncate(block.len() - 1);
+                cut_off(block, rows, before);
                 return Ok(());
             }
             if let Some(last) = block.t.last_mut() {
@@ -419,6 +421,10 @@ impl Reader {
                     positions: format!("{q:?}"),
                 },
             });
+        }
+        if self.pass.layout.conversion.is_some() {
+            // of what the torques of the joints were made
+            block.tau.truncate(at_tau + self.activity.len());
         }
         let same = || block.repeats_beside_positions();
         let stale = self.stale.judge(t, &block.q[at_q..], same);
@@ -458,4 +464,17 @@ impl Reader {
             rows,
         })
     }
+}
+
+/// Where positions, torques and velocities of a block end.
+fn ends(block: &Block) -> [usize; 3] {
+    [block.q.len(), block.tau.len(), block.dq.len()]
+}
+
+/// Takes off what was appended behind these rows, however wide it was.
+fn cut_off(block: &mut Block, rows: usize, [q, tau, dq]: [usize; 3]) {
+    block.t.truncate(rows);
+    block.q.truncate(q);
+    block.tau.truncate(tau);
+    block.dq.truncate(dq);
 }

@@ -138,6 +138,10 @@ impl RowStore {
         &self.found
     }
 
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+
     pub(crate) fn files(&self) -> &[PathBuf] {
         &self.files
     }

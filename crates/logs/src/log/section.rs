@@ -252,16 +252,66 @@ pub struct ActuatorChannels {
     pub volts_scale: Option<f64>,
 }
 
-/// `[log] torque`: the torque that a controller of positions asked of a torque drive, kp (command - q) - kd dq.
+/// `[log] torque`: the torque that a controller of positions asked of a torque drive, kp (command - q) +
+/// kd (velocity_command - dq) + feed_forward.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ControllerTorque {
     /// Stiffness and damping, `[kp, kd]` \[Nm/rad, Nm s/rad or N/m, N s/m\]: one pair for all joints, or one of each.
     pub pd: ControllerGains,
-    /// Column of the commanded position, in which `{joint}` stands for the name of the joint; in the unit, sign and
-    /// scale of the position. `reference` of `[log.joint.NAME]` where absent.
+    /// Column of the commanded position, in the unit, sign and scale of the position. `reference` of
+    /// `[log.joint.NAME]` where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub command: Option<String>,
+    pub command: Option<ColumnsOfJoints>,
+    /// Column of the commanded velocity, written as that of the position; 0 where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_command: Option<ColumnsOfJoints>,
+    /// Column of the torque that the controller adds \[N or Nm\], in the sign of the position; none where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feed_forward: Option<ColumnsOfJoints>,
+}
+
+impl ControllerTorque {
+    /// The keys that name columns beside the command of the position, each with its columns.
+    pub fn further(&self) -> impl Iterator<Item = (&'static str, &ColumnsOfJoints)> {
+        let keys = [
+            ("velocity_command", &self.velocity_command),
+            ("feed_forward", &self.feed_forward),
+        ];
+        keys.into_iter()
+            .filter_map(|(key, column)| Some((key, column.as_ref()?)))
+    }
+}
+
+/// A column for each joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ColumnsOfJoints {
+    /// One name, in which `{joint}` stands for the name of the joint.
+    Pattern(String),
+    /// The names, in the order of the joints.
+    OfEach(Vec<String>),
+}
+
+impl ColumnsOfJoints {
+    /// What stands in a pattern for the name of the joint.
+    pub const JOINT: &str = "{joint}";
+
+    /// The column of a joint, by its place and its name; empty where there is none.
+    pub fn of(&self, place: usize, joint: &str) -> String {
+        match self {
+            Self::Pattern(pattern) => pattern.replace(Self::JOINT, joint),
+            Self::OfEach(names) => names.get(place).cloned().unwrap_or_default(),
+        }
+    }
+
+    /// Whether it has one column for each of so many joints.
+    pub fn fits(&self, joints: usize) -> bool {
+        match self {
+            Self::Pattern(pattern) => joints == 1 || pattern.contains(Self::JOINT),
+            Self::OfEach(names) => names.len() == joints,
+        }
+    }
 }
 
 /// Stiffness and damping.

@@ -13,7 +13,7 @@ use super::units::{in_degrees, of_positions, of_torques, other_velocity, stated_
 use super::urdf_joint::UrdfJoint;
 use crate::inspect::ChannelRole;
 use crate::inspect::words::without_joint;
-use crate::log::{TORQUES, UnitKind, escape, stated_unit};
+use crate::log::{ColumnsOfJoints, TORQUES, UnitKind, escape, stated_unit};
 use cft_ident_core::robot::JointKind;
 
 /// One joint and its columns.
@@ -211,13 +211,16 @@ impl Mapping {
         let (role, what) = ROLES[role];
         best(columns, role, false, names, beside).or_else(|| {
             let taken = best(columns, role, true, names, beside)?;
-            if role == ChannelRole::Torque {
-                self.torque_is = "commanded";
-            }
-            self.checks.push(format!(
+            let mut check = format!(
                 "{what}: no measured ones are found, {} are commanded ones",
                 escape(&taken.pattern)
-            ));
+            );
+            if role == ChannelRole::Torque {
+                self.torque_is = "commanded";
+                check += ", which hold what a controller computed or asked for and no friction that it did not know";
+                check += &law_line(columns, names, beside).unwrap_or_default();
+            }
+            self.checks.push(check);
             Some(taken)
         })
     }
@@ -357,6 +360,36 @@ impl Mapping {
     pub fn kind(&self) -> JointKind {
         self.joints.first().map_or(JointKind::Revolute, |j| j.kind)
     }
+}
+
+/// The line by which the law of a drive gives the torques, where a log holds commands of positions.
+fn law_line(columns: &[LogColumn], joints: &[&str], beside: Option<&str>) -> Option<String> {
+    let asked = |role| -> Option<String> {
+        let taken = best(columns, role, true, joints, beside)
+            .filter(|taken| taken.how != ColumnAssignment::InPart)?;
+        let names: Vec<&str> = taken.columns.iter().flatten().map(|c| &*c.name).collect();
+        let pattern = taken.pattern.replace('#', ColumnsOfJoints::JOINT);
+        let of = ColumnsOfJoints::Pattern(pattern.clone());
+        let named = joints.iter().enumerate().map(|(k, joint)| of.of(k, joint));
+        Some(match named.eq(names.iter().copied()) {
+            true => format!("{:?}", escape(&pattern)),
+            false => format!(
+                "{:?}",
+                names.iter().map(|name| escape(name)).collect::<Vec<_>>()
+            ),
+        })
+    };
+    let command = asked(ChannelRole::Position)?;
+    let further = [
+        ("velocity_command", asked(ChannelRole::Velocity)),
+        ("feed_forward", asked(ChannelRole::Torque)),
+    ];
+    let further = further.into_iter();
+    let further = further.filter_map(|(key, column)| Some(format!(", {key} = {}", column?)));
+    Some(format!(
+        "; of a drive that is asked for kp (command - q) + kd (velocity_command - dq) + feed_forward, the torque is `torque = {{ pd = [kp, kd], command = {command}{} }}` in [log], in place of `torque` of the joints",
+        further.collect::<String>()
+    ))
 }
 
 fn plain(known: &UrdfJoint) -> JointColumns {

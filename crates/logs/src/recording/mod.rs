@@ -291,6 +291,14 @@ impl Recording {
         }
     }
 
+    /// Names of the columns of its log, those of no channel among them; of a recording the fields that are read.
+    pub fn columns(&self) -> &[String] {
+        match &self.rows {
+            RecordedRows::Parsed(_, store, _) => store.names(),
+            RecordedRows::Arrays(..) => &[],
+        }
+    }
+
     /// The instant from which its times are counted.
     pub fn origin(&self) -> Instant {
         self.inspection.origin()

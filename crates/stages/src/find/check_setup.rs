@@ -10,6 +10,7 @@ use cft_ident_core::robot::friction::sign;
 use cft_ident_logs::log::{DeclaredChannels as Logged, Layout};
 
 use super::setup_words;
+use crate::fit::computed_torque::unused_commands;
 use crate::fit::gains;
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
@@ -65,6 +66,10 @@ pub fn check_setup(data: &Dataset, control: &Control) -> Result<CheckedSetup, Id
             },
             ..CheckedSetup::default()
         });
+    }
+    if !unused_commands(setup, logs).is_empty() {
+        // a law that lacks terms looks like signs, scales and gravity
+        return Ok(CheckedSetup::default());
     }
     let (channels, sample) = sampled(setup, logs, control)?;
     let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {

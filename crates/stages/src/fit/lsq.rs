@@ -1,11 +1,13 @@
 //! The inertial parameters by linear least squares, and friction with them where it is not known.
 
 use super::by_motion::by_motion;
+use super::computed_torque::{mostly_offset, no_drive};
 use super::contact::moved_by_bridges;
 use super::dynamics::IdentifiedDynamics;
 use super::judged_estimate::JudgedEstimate;
 use super::lsq_notes::lsq_notes;
 use super::lsq_problem::{LsqProblem, LsqSettings};
+use super::replayed_torque::replayed;
 use crate::held_out::residual::JointResidual;
 use crate::held_out::validate::errors_on_fitted;
 use crate::input::control::Control;
@@ -36,6 +38,9 @@ pub fn lsq(
     let model = found.model(&data.setup, problem.friction_file());
     let errors = errors_on_fitted(data, &model, control)?;
     found.joints = errors.joints.into_iter().map(JointResidual::of).collect();
+    found.notes.extend(no_drive(&problem, &found)?);
+    found.notes.extend(mostly_offset(&found));
+    found.notes.extend(replayed(&data.logs, control)?);
     // what is set aside is looked at row by row
     if data.reduced.is_empty() {
         found.set_blocks_aside(data, &model, control)?;

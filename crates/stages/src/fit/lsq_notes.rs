@@ -1,5 +1,6 @@
 //! What is noticed of a fit.
 
+use super::computed_torque::{asked_for, unused_commands};
 use super::consistent::ConsistentLinks;
 use super::contact::contacts_in;
 use super::estimate::{EstimatorAccount, InertialEstimate};
@@ -31,6 +32,13 @@ pub(crate) fn lsq_notes(
     let (setup, estimate) = (&problem.data.setup, &judged.estimate);
     let gains = problem.settings.gains.iter();
     let mut notes = contacts_in(rows)?;
+    let unused = unused_commands(setup, &problem.data.logs);
+    notes.extend(
+        unused
+            .into_iter()
+            .map(|(key, columns)| StageNote::Fit(FitNote::UnusedCommands { key, columns })),
+    );
+    notes.extend(asked_for(setup, &problem.data.logs).map(StageNote::Fit));
     notes.extend(StageNote::of_robot(&setup.file));
     notes.extend(gains.flat_map(|gains| gains.notes.clone()));
     notes.extend(of_method(problem, judged).map(StageNote::Fit));

@@ -1,6 +1,8 @@
 //! Numbers by logs: friction, inertial parameters, torque per ampere, a load.
 
 pub(crate) mod by_motion;
+pub(crate) mod carried;
+pub(crate) mod computed_torque;
 pub(crate) mod consistent;
 pub(crate) mod contact;
 pub(crate) mod dynamics;
@@ -18,5 +20,7 @@ pub(crate) mod motion_fit;
 pub(crate) mod own_fit;
 pub(crate) mod payload;
 pub(crate) mod payload_result;
+pub(crate) mod payload_rows;
 pub(crate) mod prior;
+pub(crate) mod replayed_torque;
 pub(crate) mod weakest;

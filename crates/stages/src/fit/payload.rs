@@ -7,15 +7,18 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::carried::carried;
 use super::gains::LSQ_WITH_GAINS;
 use super::payload_result::{
-    GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
+    CarriedSpan, GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
 };
+use super::payload_rows::{BLOCK_S, HAT, LEFT, OWN, Rows, places, rows};
 use crate::band::NORMAL_95;
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
-use crate::input::in_memory::{InMemory, read_whole};
+use crate::input::in_memory::read_whole;
+use crate::input::log_data::LogData;
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{ModelNote, StageNote};
 use cft_ident_core::effect::AugmentedModel;
@@ -25,21 +28,11 @@ use cft_ident_core::judge::NUMBERS;
 use cft_ident_core::math::long_run::long_run;
 use cft_ident_core::math::rank::svd;
 use cft_ident_core::math::rfactor::RFactor;
-use cft_ident_core::motion::{ParallelFilters, Stretch, rest};
 use cft_ident_core::robot::bodies::StandardMap;
-use cft_ident_core::robot::friction::sign;
 use cft_ident_core::robot::standard::{Body, STANDARD};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::TorqueIs;
 
-/// Entries of a row: ten of the body, viscous and Coulomb friction, offset.
-const OWN: usize = STANDARD + 3;
-/// Where rows have the torque of the model, what it leaves, and their weight.
-const HAT: usize = OWN;
-const LEFT: usize = OWN + 1;
-const WEIGHT: usize = OWN + 2;
-/// Duration of a block of scores \[s\].
-const BLOCK_S: f64 = 0.25;
 /// Rounds of the joints' weights and of the gains, which multiply the body too.
 const ROUNDS: usize = 4;
 /// Share of the largest singular value (columns scaled) below which a direction is not excited.
@@ -50,16 +43,6 @@ const OPEN_PART: f64 = 1e-3;
 /// Relative deviation of the gains of currents where none were fitted to this robot, one for all joints: published ones
 /// are off by up to 8 %. Half: weighed loads lie outside; twice: the interval says nothing of a load.
 const GAIN_DEVIATION: f64 = 0.04;
-
-/// Filtered rows of every joint, and the sums that say what the model's own parameters do to a fit of them.
-struct Rows {
-    /// Joint by joint: entries of each row, and its block.
-    joints: Vec<Vec<([f64; OWN + 3], usize)>>,
-    /// Stretch of each block.
-    blocks: Vec<usize>,
-    /// Filtered columns of the model's inertial parameters beside the entries, joint by joint: `OWN + 1` x p sums.
-    beside: Vec<DMatrix<f64>>,
-}
 
 /// Finds the body.
 ///
@@ -82,12 +65,23 @@ pub fn payload(
     let whole = read_whole(setup, logs, control)?;
     setup.check_temperatures(model, logs, &whole.stretches)?;
     let work = control.begin("payload", None);
-    let rows = rows(setup, model, &whole, name, control)?;
+    let smear_s = setup.settings().cutoff_hz.recip();
+    let of = |spans: &[CarriedSpan]| rows(setup, model, &whole, name, (spans, smear_s), control);
+    let mut rows = of(&[])?;
+    let names: Vec<String> = logs.iter().map(LogData::name).collect();
+    let carried = carried(&rows, &names);
+    if !carried.is_empty() {
+        rows = of(&carried)?;
+    }
     let covariance = inertial_covariance(file, model);
     let declared = has_declared_gains(file);
     let common = if declared { GAIN_DEVIATION } else { 0.0 };
     let readings = [false, true].map(|gains| reading(setup, &rows, &covariance, (gains, common)));
-    let readings = readings.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut readings = readings.into_iter().collect::<Result<Vec<_>, _>>()?;
+    if let [held, free] = &mut readings[..] {
+        free.forget_undetermined(held);
+    }
+    let unusual = unusual(&rows, &readings, file);
     drop(work);
     control.check()?;
     let mut notes = whole.notes;
@@ -98,7 +92,9 @@ pub fn payload(
     }
     let links = robot.tree().links();
     Ok(Payload {
-        verdict: PayloadVerdict::of(&readings),
+        verdict: PayloadVerdict::of(&readings, unusual),
+        unusual,
+        carried,
         link: links.last().map_or(String::new(), |link| link.name.clone()),
         readings,
         samples: rows.joints.iter().map(|rows| rows.len() as u64).sum(),
@@ -113,92 +109,24 @@ fn has_declared_gains(file: &ModelFile) -> bool {
     currents && file.provenance.command != LSQ_WITH_GAINS
 }
 
+/// How many times the usual error of the model is left of the joint of which most is, with the body.
+fn unusual(rows: &Rows, readings: &[PayloadReading], file: &ModelFile) -> Option<f64> {
+    let left = readings.first()?.joints.iter().zip(&rows.joints);
+    let over = left.filter_map(|(left, rows)| {
+        let usual = file
+            .residual_std
+            .get(&left.joint)
+            .filter(|usual| **usual > 0.0)?;
+        (!rows.is_empty()).then(|| left.rmse / usual)
+    });
+    over.reduce(f64::max)
+}
+
 /// Covariance of the model's inertial parameters, zeros where it is not known.
 fn inertial_covariance(file: &ModelFile, model: &AugmentedModel) -> DMatrix<f64> {
     let (u, p) = (model.model.parameters(), model.model.theta.len());
     let whole = DMatrix::from_row_slice(u, u, &file.model_covariance(&model.model));
     whole.view((0, 0), (p, p)).into_owned()
-}
-
-fn rows(
-    setup: &RobotSetup,
-    model: &AugmentedModel,
-    whole: &InMemory,
-    name: &str,
-    control: &Control,
-) -> Result<Rows, IdentifyError> {
-    let (n, p) = (setup.robot.joints(), model.model.theta.len());
-    let failed = |error| IdentifyError::motion(name, error);
-    let filters = ParallelFilters::design(&setup.settings(), &whole.stretches).map_err(failed)?;
-    let mut out = Rows {
-        joints: vec![Vec::new(); n],
-        blocks: Vec::new(),
-        beside: vec![DMatrix::zeros(OWN + 1, p); n],
-    };
-    for (number, stretch) in whole.stretches.iter().enumerate() {
-        control.check()?;
-        let filter = filters.of(stretch);
-        if filter.rows(stretch.len()) < 2 {
-            continue;
-        }
-        let first = out.blocks.len();
-        let seconds = stretch.dt * stretch.len() as f64;
-        let count = (seconds / BLOCK_S).ceil().max(1.0) as usize;
-        out.blocks.extend(std::iter::repeat_n(number, count));
-        let hat = model.reconstruct(stretch);
-        for (j, hat) in hat.iter().enumerate() {
-            // a joint that rests takes any torque up to its Coulomb level
-            let weights = filter.weights(stretch, j, whole.rest_speed[j]);
-            let channels = channels(setup, model, stretch, (j, hat), &weights);
-            let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
-            let filtered = filter.run(&channels).map_err(failed)?;
-            let kept = 0..filter.rows(stretch.len());
-            for i in kept.filter(|i| !rest::rests(filtered[WEIGHT][*i])) {
-                let row: [f64; OWN + 3] = std::array::from_fn(|k| filtered[k][i]);
-                let at = (filter.sample_of(i) as f64 * stretch.dt / BLOCK_S) as usize;
-                for (c, x) in row[..=HAT].iter().enumerate() {
-                    for k in 0..p {
-                        out.beside[j][(c, k)] += x * filtered[OWN + 3 + k][i];
-                    }
-                }
-                out.joints[j].push((row, first + at.min(count - 1)));
-            }
-        }
-    }
-    Ok(out)
-}
-
-/// Channels of one joint along a stretch: entries, model, what it leaves, weight, then the regressor.
-fn channels(
-    setup: &RobotSetup,
-    model: &AugmentedModel,
-    stretch: &Stretch,
-    (j, hat): (usize, &[f64]),
-    weights: &[f64],
-) -> Vec<Vec<f64>> {
-    let (n, p) = (setup.robot.joints(), model.model.theta.len());
-    let mut out = vec![Vec::with_capacity(stretch.len()); OWN + 3 + p];
-    let mut regressor = vec![0.0; n * p];
-    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    for (k, hat) in hat.iter().enumerate() {
-        stretch.at(k, &mut q, &mut v, &mut a);
-        model.model.robot.regressor(&q, &v, &a, &mut regressor);
-        let weight = weights[k];
-        let body = setup.robot.tool_row(j, &q, &v, &a);
-        let own = [v[j], sign(v[j]), 1.0, *hat, stretch.tau[j][k] - hat];
-        let all = body.into_iter().chain(own).map(|x| weight * x);
-        let rest = regressor[j * p..(j + 1) * p].iter().map(|x| weight * x);
-        let all = all.chain([weight]).chain(rest);
-        out.iter_mut().zip(all).for_each(|(out, x)| out.push(x));
-    }
-    out
-}
-
-/// Places of the unknowns of joint `j`: the body, its friction and offset, and its gain.
-fn places(j: usize, n: usize, gains: bool) -> Vec<usize> {
-    let own = (0..3).map(|k| STANDARD + 3 * j + k);
-    let gain = gains.then_some(STANDARD + 3 * n + j);
-    (0..STANDARD).chain(own).chain(gain).collect()
 }
 
 /// Where a fit stands: gain errors multiply the body, so that its columns depend on both.
@@ -255,9 +183,9 @@ fn reading(
         let point = Point::of(&theta, n, gains);
         for (j, of) in rows.joints.iter().enumerate() {
             let places = places(j, n, gains);
-            for (row, _) in of {
+            for row in of {
                 whole.fill(0.0);
-                let (columns, left) = point.linear(j, row, gains);
+                let (columns, left) = point.linear(j, &row.numbers, gains);
                 for (at, x) in places.iter().zip(columns) {
                     whole[*at] = weights[j] * x;
                 }
@@ -280,9 +208,9 @@ fn reading(
     for (j, of) in rows.joints.iter().enumerate() {
         let places = places(j, n, gains);
         let square = weights[j] * weights[j];
-        for ((row, block), error) in of.iter().zip(errors(rows, j, n, &theta, gains)) {
-            for (at, x) in places.iter().zip(point.linear(j, row, gains).0) {
-                scores[*block][*at] += square * x * error;
+        for (row, error) in of.iter().zip(errors(rows, j, n, &theta, gains)) {
+            for (at, x) in places.iter().zip(point.linear(j, &row.numbers, gains).0) {
+                scores[row.block][*at] += square * x * error;
             }
         }
         // an error of the model is scaled as the model is
@@ -300,7 +228,8 @@ fn reading(
             }
         }
     }
-    let scores: Vec<(usize, DVector<f64>)> = rows.blocks.iter().copied().zip(scores).collect();
+    let stretches = rows.blocks.iter().map(|block| block.stretch);
+    let scores: Vec<(usize, DVector<f64>)> = stretches.zip(scores).collect();
     let lag = bandwidth(&scores, u, BLOCK_S);
     let middle = long_run(&scores, u, lag) + &by_model * covariance * by_model.transpose();
     let mut spread = &inverse * middle * &inverse;
@@ -322,8 +251,8 @@ fn errors<'a>(
     gains: bool,
 ) -> impl Iterator<Item = f64> + 'a {
     let (places, point) = (places(j, n, gains), Point::of(theta, n, gains));
-    rows.joints[j].iter().map(move |(row, _)| {
-        let (columns, left) = point.linear(j, row, gains);
+    rows.joints[j].iter().map(move |row| {
+        let (columns, left) = point.linear(j, &row.numbers, gains);
         let fitted = places.iter().zip(columns).map(|(at, x)| theta[*at] * x);
         left - fitted.sum::<f64>()
     })
@@ -334,10 +263,10 @@ fn is_worse(rows: &Rows, j: usize, errors: impl Iterator<Item = f64>) -> bool {
     let mut scores: Vec<(usize, DVector<f64>)> = (rows
         .blocks
         .iter()
-        .map(|stretch| (*stretch, DVector::zeros(1))))
+        .map(|block| (block.stretch, DVector::zeros(1))))
     .collect();
-    for ((row, block), error) in rows.joints[j].iter().zip(errors) {
-        scores[*block].1[0] += error * error - row[LEFT] * row[LEFT];
+    for (row, error) in rows.joints[j].iter().zip(errors) {
+        scores[row.block].1[0] += error * error - row.numbers[LEFT].powi(2);
     }
     let more: f64 = scores.iter().map(|(_, score)| score[0]).sum();
     let mean = more / scores.len().max(1) as f64;
@@ -443,11 +372,11 @@ fn payload_of(
     let of_joint = |j: usize| {
         let torque: f64 = rows.joints[j]
             .iter()
-            .map(|(row, _)| (row[HAT] + row[LEFT]).powi(2))
+            .map(|row| (row.numbers[HAT] + row.numbers[LEFT]).powi(2))
             .sum();
         let before: f64 = rows.joints[j]
             .iter()
-            .map(|(row, _)| row[LEFT].powi(2))
+            .map(|row| row.numbers[LEFT].powi(2))
             .sum();
         let after: f64 = errors(rows, j, n, theta, gains).map(|e| e * e).sum();
         let errors = errors(rows, j, n, theta, gains);
@@ -456,6 +385,7 @@ fn payload_of(
             joint: names[j].clone(),
             before: (before / torque).sqrt(),
             after: (after / torque).sqrt(),
+            rmse: (after / rows.joints[j].len().max(1) as f64).sqrt(),
         }
     };
     PayloadReading {

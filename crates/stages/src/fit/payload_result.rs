@@ -11,6 +11,41 @@ use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
 use cft_ident_logs::log::Provenance;
 
+/// Times the usual error of a model from which on its absence explains nothing: other logs of a machine leave twice as
+/// much. Half: no log of another day is without a payload; twice: a load of a tenth of the arm passes for none.
+const UNUSUAL: f64 = 4.0;
+/// Times the deviation of the other reading from which on a number is not determined.
+const OPEN: f64 = 1000.0;
+
+/// A part of a log in which the load is carried.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CarriedSpan {
+    /// Name of the log.
+    pub log: String,
+    /// From its first row on \[s\]; null where it is there from the beginning.
+    pub from_s: Option<f64>,
+    /// The same; null where it stays to the end.
+    pub to_s: Option<f64>,
+    /// Place of the log among those that are read.
+    #[serde(skip)]
+    pub place: usize,
+}
+
+impl CarriedSpan {
+    /// Whether a time of a log is in it, and whether it is so near to an end that filters mix both sides: `room` \[s\].
+    pub(super) fn holds(&self, log: usize, t: f64, room: f64) -> (bool, bool) {
+        if log != self.place {
+            return (false, false);
+        }
+        let (from, to) = (
+            self.from_s.unwrap_or(f64::NEG_INFINITY),
+            self.to_s.unwrap_or(f64::INFINITY),
+        );
+        let near = (t - from).abs() < room || (t - to).abs() < room;
+        (from <= t && t < to, near)
+    }
+}
+
 /// What a log says of the mass on the last link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -23,6 +58,9 @@ pub enum PayloadVerdict {
     GainsContradict,
     /// The interval holds zero with the gains of the model.
     NoneSeen,
+    /// The interval holds zero, and the model leaves many times its usual error: something else is on the arm or acts on
+    /// it.
+    Unexplained,
     /// The log holds nothing on the mass.
     NotDetermined,
 }
@@ -52,6 +90,9 @@ pub struct LeftOfJoint {
     pub before: f64,
     /// The same with body, friction and offset (and gains) of this reading.
     pub after: f64,
+    /// What is left then, root mean square \[N or Nm\].
+    #[serde(skip)]
+    pub rmse: f64,
     /// Whether the body that suits all joints together makes this joint's error larger than chance does.
     pub worse: bool,
 }
@@ -81,6 +122,11 @@ pub struct Payload {
     pub verdict: PayloadVerdict,
     /// With the gains of the model, then with free ones.
     pub readings: Vec<PayloadReading>,
+    /// Parts of the logs in which it is carried; empty where it is throughout.
+    pub carried: Vec<CarriedSpan>,
+    /// How many times the usual error of the model is left of the joint of which most is; null where the model file does
+    /// not say what is usual.
+    pub unusual: Option<f64>,
     pub samples: u64,
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
@@ -102,13 +148,17 @@ impl IntervalNumber {
 }
 
 impl PayloadVerdict {
-    pub(crate) fn of(readings: &[PayloadReading]) -> Self {
+    /// `unusual`: how many times the usual error of the model is left.
+    pub(crate) fn of(readings: &[PayloadReading], unusual: Option<f64>) -> Self {
         let [held, free] = readings else {
             return Self::NotDetermined;
         };
         match held.mass.value {
             None => Self::NotDetermined,
-            Some(_) if !held.mass.is_above_zero() => Self::NoneSeen,
+            Some(_) if !held.mass.is_above_zero() => match unusual {
+                Some(times) if times > UNUSUAL => Self::Unexplained,
+                _ => Self::NoneSeen,
+            },
             Some(_) if !free.mass.meets(&held.mass) => Self::GainsContradict,
             Some(_) if free.mass.is_above_zero() => Self::Seen,
             Some(_) => Self::NotApartFromGains,
@@ -117,6 +167,21 @@ impl PayloadVerdict {
 }
 
 impl PayloadReading {
+    /// Takes numbers for what they are where they are known so much worse than in another reading that they say nothing.
+    pub(super) fn forget_undetermined(&mut self, other: &Self) {
+        let own = std::iter::once(&mut self.mass)
+            .chain(&mut self.centre)
+            .chain(&mut self.inertia);
+        let others = std::iter::once(&other.mass)
+            .chain(&other.centre)
+            .chain(&other.inertia);
+        for (own, other) in own.zip(others) {
+            if own.std > other.std.map(|std| OPEN * std) {
+                (own.value, own.std, own.interval_95) = (None, None, None);
+            }
+        }
+    }
+
     /// Joints whose error this reading makes larger.
     pub fn worse(&self) -> impl Iterator<Item = &LeftOfJoint> {
         self.joints.iter().filter(|joint| joint.worse)

@@ -184,6 +184,20 @@ pub enum FitNote {
     SmoothedReference,
     /// At a share of the steps of `iv` no motion could be simulated.
     FailedSteps { share: f64 },
+    /// Columns of torques that were commanded or computed, by their names.
+    AskedFor { columns: Vec<String> },
+    /// Torques of two logs are equal to the last digit, and their motions are not.
+    ReplayedTorque { logs: [String; 2] },
+    /// A torque that is an offset for the most part: the relative error, and that of what varies, fractions.
+    MostlyOffset { joint: String, errors: [f64; 2] },
+    /// Columns of commands that the law of the controller in `[log] torque` leaves out, and its key for them.
+    UnusedCommands {
+        key: &'static str,
+        columns: Vec<String>,
+    },
+    /// The torque is one that no drive was measured to give: largest relative error of a joint, and largest share of its
+    /// torque that is friction at its top speed, fractions.
+    NoDrive { error: f64, friction: f64 },
     /// An estimator did not settle.
     NotSettled {
         estimator: EstimatorKind,

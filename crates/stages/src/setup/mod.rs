@@ -76,6 +76,9 @@ pub(crate) struct SetupLimits {
     pub rows: usize,
     /// Hypotheses that few rows pass on to all rows.
     pub short_list: usize,
+    /// Share of the squares of a torque that varies, below which errors are held against what varies: half of the torque
+    /// itself. Half: a joint that carries a weight hides an error of its sign; twice: errors of sound arms look larger.
+    pub varies: f64,
 }
 
 pub(crate) const LIMITS: SetupLimits = SetupLimits {
@@ -89,4 +92,5 @@ pub(crate) const LIMITS: SetupLimits = SetupLimits {
     still: 0.01,
     rows: 2000,
     short_list: 12,
+    varies: 0.25,
 };

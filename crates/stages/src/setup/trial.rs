@@ -10,6 +10,7 @@ use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::problem::Problem;
 use super::rows::{RowSums, Rows};
+use cft_ident_core::inertia::columns::JointTerm;
 use cft_ident_core::judge::{
     ErrorGain, FitToAll, NUMBERS, Term, Terms, agreement_on_share, compare,
 };
@@ -96,16 +97,37 @@ impl Mixed {
     }
 }
 
-/// By which each joint's squares count: those of its own torque, 0 where it does not move.
+/// By which each joint's squares count: those of its own torque, or of what varies of it where that is the smaller
+/// part; 0 where it does not move.
 fn weights(problem: &Problem, total: &[DMatrix<f64>], mix: &[DVector<f64>]) -> Vec<f64> {
     let weight = |(j, (sums, mix)): (usize, (&DMatrix<f64>, &DVector<f64>))| {
         let torques = sums.nrows() - mix.len();
         let of_torques = sums.view((torques, torques), (mix.len(), mix.len()));
         let power = mix.dot(&(of_torques * mix));
+        let power = what_varies(problem, j, power, sums, mix).unwrap_or(power);
         let counts = problem.moving[j] && power > 0.0;
         if counts { power.recip() } else { 0.0 }
     };
     total.iter().zip(mix).enumerate().map(weight).collect()
+}
+
+/// The squares of a joint's torque without its mean, which an offset explains whatever else is wrong; none where the mean
+/// is the smaller part.
+fn what_varies(
+    problem: &Problem,
+    j: usize,
+    power: f64,
+    sums: &DMatrix<f64>,
+    mix: &DVector<f64>,
+) -> Option<f64> {
+    let own = &problem.columns.own[j];
+    let place = own.iter().position(|term| *term == JointTerm::Offset)?;
+    let torques = sums.nrows() - mix.len();
+    let column = (torques - own.len()) + place;
+    let rows = sums[(column, column)];
+    let sum = (sums.view((column, torques), (1, mix.len())) * mix)[0];
+    let varies = power - sum * sum / rows;
+    (rows > 0.0 && varies > 0.0 && varies < LIMITS.varies * power).then_some(varies)
 }
 
 fn terms(list: &[Term], weights: Vec<f64>) -> Terms {

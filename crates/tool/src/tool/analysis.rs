@@ -11,7 +11,8 @@ use super::result::{
     ForceMoment, ToolErrors, ToolForecast, ToolNumber, ToolResult, ToolStep, ToolVerdict,
     TriedReading,
 };
-use super::search::{FoundEffects, JudgedEffect, fitted, nearest_turn, search, turn_in_numbers};
+use super::search::{FoundEffects, JudgedEffect, fitted, nearest_turn, turn_in_numbers};
+use super::touch::{ToolTouch, search_without_touches};
 use super::wrench_log::{PoseRow, WrenchLog, WrenchReading};
 use super::{GRAVITY, NUMBERS};
 use cft_ident_core::judge::{NUMBERS as JUDGE, jackknife, width_95};
@@ -152,10 +153,8 @@ pub fn analyse(log: &WrenchLog, held_out: Option<&WrenchLog>) -> Result<ToolResu
         force_error: of.error,
     });
     let readings: Vec<TriedReading> = readings.collect();
-    let spread = all
-        .iter()
-        .map(|of| turning(&of.problem.rows))
-        .fold(0.0, f64::max);
+    let spreads = all.iter().map(|of| turning(&of.problem.rows));
+    let spread = spreads.fold(0.0, f64::max);
     let alike = spread < NUMBERS.least_turn;
     let best = (0..all.len()).fold(0, |best, k| match is_better(&all[k], &all[best]) {
         true => k,
@@ -176,10 +175,9 @@ pub fn analyse(log: &WrenchLog, held_out: Option<&WrenchLog>) -> Result<ToolResu
             row.moment = row.moment.map(|x| -x);
         }
     }
-    let problem = problem.weighted();
+    let (problem, found, touches) = search_without_touches(problem.weighted(), alike);
     let left_out = held_out_blocks(problem.rows.len());
     let plain = problem.fit(&[], &left_out);
-    let found = search(&problem);
     if alike && found.fit.effects.is_empty() {
         return Err(ToolError::Alike {
             degrees: spread.to_degrees(),
@@ -212,6 +210,7 @@ pub fn analyse(log: &WrenchLog, held_out: Option<&WrenchLog>) -> Result<ToolResu
         held_out,
         reading,
         reaction,
+        touches,
     };
     result.made(readings, reading_is_open)
 }
@@ -226,6 +225,8 @@ struct ResultParts<'a> {
     held_out: Option<&'a WrenchLog>,
     reading: WrenchReading,
     reaction: bool,
+    /// The mass with rows in which something pushes the tool, and these.
+    touches: Option<(f64, Vec<ToolTouch>)>,
 }
 
 impl ResultParts<'_> {
@@ -243,11 +244,8 @@ impl ResultParts<'_> {
         let centre = parameters
             .iter()
             .filter(|p| ["cx", "cy", "cz"].contains(&p.name.as_str()));
-        let far: f64 = centre
-            .filter_map(|p| p.value)
-            .map(|x| x * x)
-            .sum::<f64>()
-            .sqrt();
+        let squares = centre.filter_map(|p| p.value).map(|x| x * x);
+        let far = squares.sum::<f64>().sqrt();
         if !self.log.unit_is_stated && far > NUMBERS.farthest_m && !self.alike {
             return Err(ToolError::Units { centre_m: far });
         }
@@ -315,6 +313,11 @@ impl ResultParts<'_> {
             after: errors(&after),
             forecast,
             last_bias: problem.last_bias(fit),
+            mass_with_touches: self.touches.as_ref().map(|(mass, _)| *mass),
+            touches: self
+                .touches
+                .as_ref()
+                .map_or(Vec::new(), |(_, all)| all.clone()),
             blocks: fit.blocks.len(),
             residuals: residuals.map(|((row, a), b)| (row.t, *a, *b)).collect(),
             has_clock: self.log.has_clock,

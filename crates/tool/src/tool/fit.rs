@@ -321,6 +321,24 @@ impl WrenchProblem {
         mean_norms(&self.residual(&design, p, rows, &solved(&normal, &right)))
     }
 
+    /// What a fit to the rows that are kept leaves of every row.
+    pub fn left_by(&self, effects: &[WrenchEffect], kept: &[bool]) -> Vec<[f64; 6]> {
+        let whole = 0..self.rows.len();
+        let start = self.fit(effects, std::slice::from_ref(&whole));
+        let (at, p) = (self.at_of(&start), start.x.len());
+        let mut design = vec![0.0; 6 * p * self.rows.len()];
+        for (row, numbers) in self.rows.iter().zip(design.chunks_exact_mut(6 * p)) {
+            let mut out = RowEquations { p, numbers };
+            columns(row, self.place(row), self.base, effects, &at, &mut out);
+        }
+        let mut sums = (DMatrix::zeros(p, p), DVector::zeros(p));
+        for row in whole.clone().filter(|row| kept[*row]) {
+            let (normal, right) = self.normal(&design, p, row..row + 1);
+            sums = (sums.0 + normal, sums.1 + right);
+        }
+        self.residual(&design, p, whole, &solved(&sums.0, &sums.1))
+    }
+
     /// What a fit leaves of rows of another log: effects of time stay as they were at the end.
     pub fn left_of(&self, fitted: &WrenchFit, rows: &[PoseRow]) -> Vec<[f64; 6]> {
         let at = self.at_of(fitted);

@@ -26,6 +26,7 @@ mod search;
 mod table;
 mod taring;
 mod tool_file;
+mod touch;
 mod units;
 mod words;
 mod wrench_log;
@@ -42,8 +43,9 @@ pub use result::{
     TriedReading,
 };
 pub use tool_file::ToolFile;
+pub use touch::ToolTouch;
 pub use units::ForceUnit;
-pub use words::{number_95, step_in_words};
+pub use words::{number_95, step_in_words, touch_in_words};
 pub use wrench_log::{OrientationIs, WrenchFrame, WrenchLog, WrenchReading, WrenchSample};
 
 /// Free fall \[m/s^2\], along -z of the base.

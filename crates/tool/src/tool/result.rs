@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::next_pose::NextPose;
+use super::touch::ToolTouch;
 use super::wrench_log::WrenchReading;
 
 /// A number with its 95 % interval.
@@ -128,6 +129,10 @@ pub struct ToolResult {
     pub forecast: Option<ToolForecast>,
     /// Bias at the last row, where it drifts: force \[N\], then moment \[Nm\].
     pub last_bias: [f64; 6],
+    /// Rows that are left out, for something pushed the tool there.
+    pub touches: Vec<ToolTouch>,
+    /// The mass with them \[kg\]; null where there are none.
+    pub mass_with_touches: Option<f64>,
     /// Blocks that intervals are made by.
     pub blocks: usize,
     /// What was left of each row, along the sensor's axes: time or number of the row, then six numbers before and

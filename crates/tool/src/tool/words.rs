@@ -1,6 +1,7 @@
 //! The result in sentences.
 
 use super::result::{ToolNumber, ToolResult, ToolStep, ToolVerdict};
+use super::touch::ToolTouch;
 use cft_ident_core::number;
 
 /// `1.174 (1.169 .. 1.179)`: digits as far as the interval goes; absent where nothing is known.
@@ -60,6 +61,28 @@ pub fn step_in_words(step: &ToolStep, has_clock: bool) -> String {
             number::significant(size, 2)
         ),
     }
+}
+
+/// When something pushed the tool, and how much.
+pub fn touch_in_words(touch: &ToolTouch, has_clock: bool) -> String {
+    let [from, to] = touch.span;
+    let when = match has_clock {
+        true => format!(
+            "from {} to {} s",
+            number::significant(from, 4),
+            number::significant(to, 4)
+        ),
+        false => format!("from row {} to {}", from + 1.0, to + 1.0),
+    };
+    let moment = match touch.at_origin {
+        true => "the moment is as in other rows, so that it acts at the sensor's origin".to_owned(),
+        false => format!("the moment by {} Nm", number::significant(touch.moment, 2)),
+    };
+    format!(
+        "{when} the force is off by {}, {moment}: a touch? These {} rows are left out",
+        newton(touch.force),
+        touch.rows
+    )
 }
 
 pub(super) fn verdict(of: &ToolResult) -> ToolVerdict {

@@ -64,6 +64,7 @@ fn what_is_planted_is_named_and_nothing_else() {
     ] {
         let found = analyse(&sensor.log(3), None).unwrap();
         assert_eq!(confirmed(&found), [name], "{:?}", found.steps);
+        assert!(found.touches.is_empty(), "{name}: {:?}", found.touches);
         let [before, after] = [found.before, found.after].map(|e| e.holdout.force_error);
         assert!(
             after < 0.8 * before && after < 0.1,
@@ -168,4 +169,34 @@ fn poses_about_one_axis_leave_a_part_of_the_centre_open_and_the_next_pose_tells_
     assert_eq!(found.undetermined, ["centre along y"]);
     let next = found.next_pose.unwrap();
     assert!(next.variance_left < 0.2, "{next:?}");
+}
+
+#[test]
+fn rows_in_which_somebody_leans_on_the_tool_are_named_and_left_out() {
+    for poses in [40, 100] {
+        let sensor = Sensor {
+            poses,
+            ..Sensor::default()
+        };
+        let mut log = sensor.log(3);
+        let touched = 20..20 + poses / 20;
+        for k in touched.clone() {
+            let (sin, cos) = (k as f64).sin_cos();
+            log.samples[k].force[0] += 6.0 * sin;
+            log.samples[k].force[1] += 6.0 * cos;
+        }
+        let found = analyse(&log, None).unwrap();
+        let [touch] = &found.touches[..] else {
+            panic!("{:?}", found.touches);
+        };
+        assert_eq!(touch.span, [20.0, (touched.end - 1) as f64]);
+        assert!(
+            (touch.force - 6.0).abs() < 0.5 && touch.at_origin,
+            "{touch:?}"
+        );
+        let mass = found.number("mass").unwrap();
+        assert!((mass - sensor.mass).abs() < 0.005, "{mass}");
+        assert!((found.mass_with_touches.unwrap() - sensor.mass).abs() > 0.005);
+        assert!(confirmed(&found).is_empty());
+    }
 }

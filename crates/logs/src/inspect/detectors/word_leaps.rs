@@ -14,9 +14,9 @@ const NEAR: f64 = 0.125;
 pub(crate) struct WordLeaps {
     last: Option<f64>,
     fractions: bool,
-    /// For each of [`WIDTHS`]: leaps that are none between signed numbers, others of that size, and numbers in the
-    /// middle, where a signed one is large.
-    anew: [[u64; 3]; WIDTHS.len()],
+    /// For each of [`WIDTHS`]: leaps that are none between signed numbers, others of that size, numbers in the
+    /// middle, where a signed one is large, and leaps among the first that are of a larger power of two.
+    anew: [[u64; 4]; WIDTHS.len()],
     /// For each of [`SIGN_BITS`]: leaps by the bit, and leaps of that size at all.
     by_bit: [[u64; 2]; SIGN_BITS.len()],
     /// The greatest number.
@@ -34,12 +34,13 @@ impl WordLeaps {
         }
         self.most = self.most.max(count);
         let leap = self.last.replace(count).map_or(0.0, |last| count - last);
-        for (bits, [anew, large, middle]) in WIDTHS.iter().zip(&mut self.anew) {
+        for (bits, [anew, large, middle, wide]) in WIDTHS.iter().zip(&mut self.anew) {
             let range = 2.0_f64.powi(*bits);
             *middle += u64::from(signed(count, range).abs() > 0.375 * range);
             if leap.abs() > range / 2.0 {
                 let small = signed(leap, range).abs() < range / 4.0;
                 *(if small { anew } else { large }) += 1;
+                *wide += u64::from(small && leap.abs() > 1.5 * range);
             }
         }
         let low = count.min(count - leap);
@@ -55,7 +56,10 @@ impl WordLeaps {
 
     /// The range after which the numbers begin anew, where they are signed ones of fewer bits than they are logged with.
     pub(crate) fn range(&self) -> Option<f64> {
-        let of_width = |[anew, large, middle]: &[u64; 3]| *anew > 0 && *large == 0 && *middle == 0;
+        // a word above changes now and then, and a sign most of the time
+        let of_width = |[anew, large, middle, wide]: &[u64; 4]| {
+            *anew > 0 && *large == 0 && *middle == 0 && 2 * wide <= *anew
+        };
         let found = self
             .anew
             .iter()
@@ -97,5 +101,20 @@ mod tests {
         let by_bit = leaps(|x| if x < 0.0 { 1024.0 - x } else { x });
         assert_eq!((by_bit.range(), by_bit.sign_bit()), (None, Some(1024.0)));
         assert_eq!(signed(720_890.0, 65_536.0), -6.0);
+        // small numbers leap by multiples of smaller words too
+        let small = |x: f64| (0.2 * x).round();
+        assert_eq!(
+            leaps(|x| small(x).rem_euclid(65_536.0)).range(),
+            Some(65_536.0)
+        );
+        assert_eq!(leaps(|x| small(x).rem_euclid(256.0)).range(), Some(256.0));
+        let by_bit = leaps(|x| {
+            if small(x) < 0.0 {
+                1024.0 - small(x)
+            } else {
+                small(x)
+            }
+        });
+        assert_eq!((by_bit.range(), by_bit.sign_bit()), (None, Some(1024.0)));
     }
 }

@@ -87,7 +87,9 @@ impl JoinedTopics {
         let mut fields = TopicFields::new();
         let mut joints: Vec<usize> = Vec::new();
         let kinds = [&layout.positions, &layout.torques, &layout.velocities];
-        for (joint, channel) in kinds.into_iter().flat_map(|of| of.iter().enumerate()) {
+        let all = kinds.into_iter().flat_map(|of| of.iter().enumerate());
+        for (place, channel) in all {
+            let joint = place % layout.joints.len().max(1);
             let Some((topic, path)) = parted(&channel.column) else {
                 let column = escape(&channel.column);
                 return Err(refused(

@@ -13,6 +13,7 @@ mod runs;
 mod table;
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use self::csv::TextFile;
 pub(super) use self::json_lines::JsonRows;
@@ -62,6 +63,8 @@ pub(super) struct TextRows {
     runs: TableRuns,
     /// What the log was opened by, to look at its beginning again.
     asked: Layout,
+    /// Whether positions and torques have rows of their own, once it was looked at.
+    turns: OnceLock<bool>,
 }
 
 impl TextRows {
@@ -93,6 +96,7 @@ impl TextRows {
             columns,
             of_day: (None, 0),
             asked,
+            turns: OnceLock::new(),
         };
         if let Some(time) = rows.columns.time {
             rows.set_time(time.index, time.factor);
@@ -303,7 +307,10 @@ impl TextRows {
             return self.file.no_number(index);
         };
         let [positions, torques] = self.holds(&self.file);
-        if self.columns.torques.is_empty() || positions == torques || !self.takes_turns() {
+        if self.columns.torques.is_empty()
+            || positions == torques
+            || !self.turns.get_or_init(|| self.takes_turns())
+        {
             return self.file.no_number(index);
         }
         let name = |at: usize| escape(&self.names()[at]).replace(['\'', '"', '`', '$', '\\'], "_");

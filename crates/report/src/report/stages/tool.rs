@@ -8,6 +8,7 @@ use cft_ident_core::number;
 use cft_ident_logs::log::Provenance;
 use cft_ident_tool::tool::{
     RobotController, ToolFile, ToolNumber, ToolResult, ToolStep, number_95, step_in_words,
+    touch_in_words,
 };
 
 /// Verdict, numbers, effects, and what to do next.
@@ -94,7 +95,21 @@ fn sentences(of: &ToolResult) -> Vec<String> {
             number_95(&of.mass_by_differences, 1.0)
         ));
     }
-    if let Some(forecast) = &of.forecast {
+    for touch in &of.touches {
+        out.push(touch_in_words(touch, of.has_clock));
+    }
+    if let Some(mass) = of.mass_with_touches {
+        out.push(format!(
+            "with these rows the mass is {} kg",
+            number::significant(mass, 3)
+        ));
+    }
+    let drifts = of.steps.iter().any(|s| s.effect == "bias-drift");
+    if let Some(forecast) = of
+        .forecast
+        .as_ref()
+        .filter(|of| drifts || of.with.force_error <= of.without.force_error)
+    {
         let [without, with] =
             [forecast.without, forecast.with].map(|e| number::significant(e.force_error, 3));
         let part = number::percent(1.0 - forecast.fitted);

@@ -30,6 +30,35 @@ impl Display for FitNote {
                 "iv: at {} of the simulated steps the motion could not be computed or went astray, and joints were moved by themselves or put back; instruments are poorer for it",
                 percent(*share)
             ),
+            Self::AskedFor { columns } => write!(
+                f,
+                "{} stands for the torque, which by its name a controller computed or asked for: friction, load and what the controller's model lacks are not in it; take the column of the measured torque or current, or the whole law of the drive (`torque = {{ pd = .. }}` in [log])",
+                columns.join(", ")
+            ),
+            Self::ReplayedTorque {
+                logs: [first, second],
+            } => write!(
+                f,
+                "the torques of {first} and {second} are equal to the last digit, and their motions are not: a program played them, and no drive was measured"
+            ),
+            Self::MostlyOffset { joint, errors } => {
+                let [whole, varying] = errors.map(percent);
+                write!(
+                    f,
+                    "the torque of {joint} is an offset for the most part: the model misses {whole} of it, and {varying} of what varies"
+                )
+            }
+            Self::UnusedCommands { key, columns } => write!(
+                f,
+                "the law of [log] torque leaves out columns that the log holds, {}: where the drive is asked for them too, `{key} = \"..\"` in it names them ({{joint}} for the name of the joint); what is left out looks like friction and gravity that are not there",
+                columns.join(", ")
+            ),
+            Self::NoDrive { error, friction } => write!(
+                f,
+                "no joint's torque is missed by more than {}, and friction takes no more than {} of one: no drive was ever measured so. These torques were computed, by a controller or a simulation without noise and friction; of a real robot this is a model of its controller's model",
+                percent(*error),
+                percent(*friction)
+            ),
             Self::NotSettled { estimator, passes } => write!(
                 f,
                 "{} did not settle in {passes} passes over the logs; its last result stands",

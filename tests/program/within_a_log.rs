@@ -1,0 +1,303 @@
+//! What a log holds beside a measured motion of one robot: torques that a controller computed, a load that comes and goes.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use cft_ident::config::RobotFile;
+use cft_ident::robot::standard::Body;
+use serde_json::Value;
+
+/// Two joints in a vertical plane.
+const ARM: &str = r#"[robot]
+model = "serial"
+drive_inertia = false
+
+[[robot.link]]
+joint = "a"
+rpy = [1.5707963267948966, 0.0, 0.0]
+
+[[robot.link]]
+joint = "b"
+xyz = [0.4, 0.0, 0.0]
+
+[friction]
+law = "viscous-coulomb"
+fitted_with_inertias = true
+
+[filter]
+cutoff_hz = 8.0
+"#;
+
+/// What the torques are made of.
+struct Plant {
+    /// Viscous and Coulomb friction of both joints.
+    friction: [f64; 2],
+    noise: f64,
+    /// Mass at the end of the last link \[kg\], and from when to when \[s\].
+    load: (f64, [f64; 2]),
+}
+
+const FREE: Plant = Plant {
+    friction: [0.0; 2],
+    noise: 0.0,
+    load: (0.0, [0.0; 2]),
+};
+
+/// A log of 24 s at 100 Hz: position, velocity, torque, and half of the torque called feed-forward.
+fn log(plant: &Plant) -> String {
+    let robot = RobotFile::parse("arm.toml", ARM).unwrap().robot();
+    let body = |mass: f64, x: f64| Body {
+        mass,
+        centre: [x, 0.02, 0.0],
+        inertia: [0.01, 0.0, 0.0, 0.03, 0.0, 0.03],
+    };
+    let of = |load: f64| {
+        let mut standard = vec![0.0; robot.standard_parameters()];
+        standard[..10].copy_from_slice(&body(4.0, 0.2).standard());
+        let own = body(2.0, 0.15).standard();
+        let carried = Body {
+            mass: load,
+            centre: [0.3, 0.0, 0.0],
+            inertia: [0.0; 6],
+        };
+        let carried = carried.standard();
+        for (k, to) in standard[10..20].iter_mut().enumerate() {
+            *to = own[k] + carried[k];
+        }
+        robot.base_of(&standard)
+    };
+    let thetas = [of(0.0), of(plant.load.0)];
+    let waves = [[(0.8, 1.7), (0.3, 4.3)], [(0.7, 2.3), (0.35, 5.1)]];
+    let mut text =
+        "t,q_a,q_b,dq_a,dq_b,q_des_a,q_des_b,dq_des_a,dq_des_b,tau_a,tau_b,tau_ff_a,tau_ff_b\n"
+            .to_owned();
+    let mut chance = 1u64;
+    for k in 0..2400 {
+        let t = 0.01 * f64::from(k);
+        let sum = |of: &dyn Fn(f64, f64) -> f64| {
+            waves.map(|w| w.iter().map(|(a, w)| of(*a, *w)).sum::<f64>())
+        };
+        let q = sum(&|a, w| a * (w * t).sin());
+        let v = sum(&|a, w| a * w * (w * t).cos());
+        let a = sum(&|a, w| -a * w * w * (w * t).sin());
+        let [from, to] = plant.load.1;
+        let theta = &thetas[usize::from(from <= t && t < to)];
+        let mut tau = [0.0; 2];
+        robot.torque(theta, &q, &v, &a, &mut tau);
+        let mut noise = || {
+            chance = chance
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            plant.noise * ((chance >> 33) as f64 / f64::from(1u32 << 31) - 0.5)
+        };
+        let ff = tau.map(|x| 0.5 * x);
+        let [viscous, coulomb] = plant.friction;
+        let tau: [f64; 2] = std::array::from_fn(|j| {
+            tau[j] + viscous * v[j] + coulomb * (200.0 * v[j]).tanh() + noise()
+        });
+        // the drive is asked for kp (q_des - q) + kd (dq_des - dq) + tau_ff
+        let dq_des = v.map(|v| 0.9 * v);
+        let q_des: [f64; 2] =
+            std::array::from_fn(|j| q[j] + (tau[j] - ff[j] - 3.0 * (dq_des[j] - v[j])) / 80.0);
+        let all = [q, v, q_des, dq_des, tau, ff];
+        let row: Vec<String> = all
+            .as_flattened()
+            .iter()
+            .map(|x| format!("{x:.6}"))
+            .collect();
+        writeln!(text, "{t:.2},{}", row.join(",")).unwrap();
+    }
+    text
+}
+
+/// Runs a command in a folder: status, document, and what it says.
+fn run(folder: &Path, line: &str) -> (i32, Value, String) {
+    let output = assert_cmd::Command::cargo_bin("cft-ident")
+        .unwrap()
+        .current_dir(folder)
+        .args(line.split_whitespace())
+        .args(["--json", "-"])
+        .output()
+        .unwrap();
+    let document = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    let said = String::from_utf8(output.stderr).unwrap();
+    (output.status.code().unwrap(), document, said)
+}
+
+fn with_log(plant: &Plant, head: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("log.csv", &log(plant));
+    write("arm.toml", &format!("{ARM}\n[log]\n{head}\n"));
+    folder
+}
+
+/// The words of a warning that doubts torques by their data.
+const NO_DRIVE: &str = "no drive was ever measured so";
+/// And by their names.
+const BY_NAME: &str = "by its name a controller computed";
+const MEASURED: &str = "torque_is = \"joint\"";
+const FED_FORWARD: &str = "torque_is = \"commanded\"\n[log.joint]\na = { torque = \"tau_ff_a\" }\nb = { torque = \"tau_ff_b\" }";
+
+#[test]
+fn a_torque_that_no_drive_gives_is_doubted_by_data_and_by_name_and_fitted_all_the_same() {
+    let real = |friction, noise| Plant {
+        friction: [0.5 * friction, friction],
+        noise,
+        ..FREE
+    };
+    for (plant, head, by_data, by_name) in [
+        (FREE, MEASURED, true, false),
+        (FREE, FED_FORWARD, true, true),
+        (real(0.8, 0.0), MEASURED, false, false),
+        (real(0.0, 0.6), MEASURED, false, false),
+        (real(0.8, 0.2), MEASURED, false, false),
+        (real(0.8, 0.2), FED_FORWARD, true, true),
+    ] {
+        let folder = with_log(&plant, head);
+        let (code, found, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
+        assert_eq!(code, 0, "{said}");
+        assert_eq!(said.contains(NO_DRIVE), by_data, "{head}: {said}");
+        assert_eq!(said.contains(BY_NAME), by_name, "{head}: {said}");
+        assert!(!found["parameters"].as_array().unwrap().is_empty());
+    }
+}
+
+#[test]
+fn torques_that_a_program_played_in_logs_of_other_motions_are_no_measurement() {
+    let plant = |noise| Plant {
+        friction: [0.4, 0.8],
+        noise,
+        ..FREE
+    };
+    let folder = with_log(&plant(0.1), MEASURED);
+    let words = "equal to the last digit";
+    let lsq = || {
+        run(
+            folder.path(),
+            "lsq log.csv other.csv -r arm.toml -o m.toml -v",
+        )
+    };
+    let write = |text: &str| std::fs::write(folder.path().join("other.csv"), text).unwrap();
+    // a motion that follows the same torques otherwise
+    let moved = |text: &str| {
+        let shifted = |line: &str| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if let Ok(q) = cells[1].parse::<f64>() {
+                cells[1] = format!("{:.6}", q + 0.002 * (7.0 * q).sin());
+            }
+            cells.join(",")
+        };
+        text.lines().map(shifted).collect::<Vec<_>>().join("\n")
+    };
+    write(&moved(&log(&plant(0.1))));
+    let (code, _, said) = lsq();
+    assert!(code == 0 && said.contains(words), "{said}");
+    write(&moved(&log(&plant(0.2))));
+    let (code, _, said) = lsq();
+    assert!(code == 0 && !said.contains(words), "{said}");
+}
+
+#[test]
+fn the_law_of_a_drive_takes_all_that_it_is_asked_for_and_columns_that_it_leaves_out_are_named() {
+    let plant = Plant {
+        friction: [0.4, 0.8],
+        noise: 0.1,
+        ..FREE
+    };
+    let law = |more: &str| {
+        let law = format!("torque = {{ pd = [80.0, 3.0], command = \"q_des_{{joint}}\"{more} }}");
+        let folder = with_log(&plant, &law);
+        run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v")
+    };
+    let (code, found, said) =
+        law(", velocity_command = \"dq_des_{joint}\", feed_forward = [\"tau_ff_a\", \"tau_ff_b\"]");
+    assert_eq!(code, 0, "{said}");
+    let value = |found: &Value, key: &str, joint: &str| {
+        let all = found["parameters"].as_array().unwrap();
+        let is = |p: &&Value| p["key"] == key && p["joint"] == joint;
+        all.iter().find(is).unwrap()["value"].as_f64().unwrap()
+    };
+    assert!((value(&found, "viscous", "a") - 0.4).abs() < 0.05);
+    assert!((value(&found, "coulomb", "b") - 0.8).abs() < 0.1);
+    assert!(!said.contains("leaves out columns"), "{said}");
+    let (code, _, said) = law("");
+    assert_eq!(code, 0, "{said}");
+    for words in ["velocity_command", "feed_forward", "dq_des_a", "tau_ff_b"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    assert!(!said.contains("gravity is not in these torques"), "{said}");
+    let (code, _, said) = law(", feed_forward = \"tau_ff_a\"");
+    assert!(
+        code == 3 && said.contains("a column for each joint"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_load_that_comes_and_goes_within_a_log_is_found_with_its_times() {
+    let plant = |load| Plant {
+        friction: [0.4, 0.8],
+        noise: 0.1,
+        load,
+    };
+    let folder = with_log(&plant((0.0, [0.0; 2])), MEASURED);
+    let path = folder.path();
+    assert_eq!(run(path, "lsq log.csv -r arm.toml -o m.toml").0, 0);
+    for (load, from, to) in [
+        ((0.8, [8.0, 16.0]), Some(8.0), Some(16.0)),
+        ((0.8, [9.0, 99.0]), Some(9.0), None),
+        ((0.8, [-1.0, 15.0]), None, Some(15.0)),
+        ((0.8, [-1.0, 99.0]), None, None),
+        ((0.0, [0.0; 2]), None, None),
+    ] {
+        std::fs::write(path.join("loaded.csv"), log(&plant(load))).unwrap();
+        let (code, found, said) = run(path, "payload loaded.csv -m m.toml");
+        assert_eq!(code, 0, "{said}");
+        let spans = found["carried"].as_array().unwrap();
+        let near = |x: &Value, t: Option<f64>| match t {
+            Some(t) => x.as_f64().is_some_and(|x| (x - t).abs() < 0.2),
+            None => x.is_null(),
+        };
+        let throughout = from.is_none() && to.is_none();
+        assert_eq!(spans.is_empty(), throughout, "{load:?}: {spans:?}");
+        for span in spans {
+            assert!(near(&span["from_s"], from), "{load:?}: {span}");
+            assert!(near(&span["to_s"], to), "{load:?}: {span}");
+        }
+        let mass = &found["readings"][0]["mass"];
+        let (value, std) = (&mass["value"], mass["std"].as_f64().unwrap());
+        let off = value.as_f64().unwrap() - load.0;
+        assert!(off.abs() < 0.03 && std < 0.02, "{load:?}: {mass}");
+        let verdict = if load.0 > 0.0 { "" } else { "none-seen" };
+        assert!(
+            found["verdict"].as_str().unwrap().contains(verdict),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn what_is_held_out_is_a_part_that_the_filter_can_use() {
+    let plant = Plant {
+        friction: [0.4, 0.8],
+        noise: 0.1,
+        ..FREE
+    };
+    let folder = with_log(&plant, MEASURED);
+    let path = folder.path().join("log.csv");
+    let whole = std::fs::read_to_string(&path).unwrap();
+    // the last quarter holds short tests alone
+    let kept = |line: &&str| {
+        let t: f64 = line.split(',').next().unwrap().parse().unwrap_or(0.0);
+        t < 17.0 || (18.5..19.2).contains(&t) || (20.5..21.2).contains(&t) || t > 23.4
+    };
+    let text: Vec<&str> = whole.lines().filter(kept).collect();
+    std::fs::write(&path, text.join("\n")).unwrap();
+    let (code, found, said) = run(folder.path(), "identify log.csv arm.toml -o run");
+    assert_eq!(code, 0, "{said}");
+    let _ = found;
+    let result = std::fs::read_to_string(folder.path().join("run/result.json")).unwrap();
+    let result: Value = serde_json::from_str(&result).unwrap();
+    assert!(!result["validate"].is_null(), "{said}");
+}
