@@ -202,9 +202,10 @@ impl IdentifyJob {
         data.check_moving()?;
         let is_usable = |spec: &LogSpec| {
             let of = logs_of(std::slice::from_ref(spec));
-            let part = LogData::read_all(&setup, &of, &[&data.logs], &context.control);
-            let found =
-                part.and_then(|part| identify::has_stretch(&setup, &part, &context.control));
+            let found = match LogData::read_all(&setup, &of, &[&data.logs], &context.control) {
+                Ok(part) => identify::has_stretch(&setup, &part, &context.control),
+                Err(error) => Err(error),
+            };
             match found {
                 // the whole log is read by now: what keeps a part from a fit is its place
                 Err(error) if !matches!(error, IdentifyError::Interrupted) => Ok(false),
