@@ -112,8 +112,11 @@ fn report(found: &Payload, logs: &str) -> Report {
     let mut all = report.everywhere();
     let mass = |gains_free: bool| {
         let reading = found.readings.iter().find(|of| of.gains_free == gains_free);
-        let value = reading.map(|of| format!("{} kg", shown(&of.mass)));
-        value.unwrap_or(number::ABSENT.to_owned())
+        match reading.filter(|of| of.mass.value.is_some()) {
+            Some(of) => format!("{} kg", shown(&of.mass)),
+            None if gains_free => "not determined: errors of the gains look the same".to_owned(),
+            None => "not determined: no motion here shows it".to_owned(),
+        }
     };
     let figure = |label, value| VerdictFigure {
         label,
@@ -239,8 +242,9 @@ fn controller_lines(found: &Payload) -> String {
     out
 }
 
-/// Where the body of a reading makes the error of a joint larger.
+/// Where the body of a reading makes the error of a joint larger; one that is not determined says nothing.
 fn made_worse(reading: &PayloadReading) -> Option<FoundLine> {
+    reading.mass.value?;
     let worse: Vec<String> = reading
         .worse()
         .map(|of| {

@@ -69,7 +69,7 @@ const ROOMS: &[(&str, &str)] = &[
     ),
     (
         "fit",
-        "note input held_out explain math block verdict number robot log mapping config motion effect friction inertia \
+        "note input held_out explain math block verdict number robot log config motion effect friction inertia \
          judge diagnose validate inspect recording setup band open_loop",
     ),
     (

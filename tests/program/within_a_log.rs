@@ -35,15 +35,35 @@ struct Plant {
     noise: f64,
     /// Mass at the end of the last link \[kg\], and from when to when \[s\].
     load: (f64, [f64; 2]),
+    /// Part of the torque of the links that the controller feeds forward.
+    fed_forward: f64,
+    /// When the arm begins to stop, for a second, and rests from then on \[s\].
+    stops: f64,
 }
 
 const FREE: Plant = Plant {
     friction: [0.0; 2],
     noise: 0.0,
     load: (0.0, [0.0; 2]),
+    fed_forward: 0.5,
+    stops: 99.0,
 };
 
-/// A log of 24 s at 100 Hz: position, velocity, torque, and half of the torque called feed-forward.
+/// Phase of the motion, its rate and acceleration by the time: the time, until the arm stops.
+fn phase(t: f64, stops: f64) -> [f64; 3] {
+    use std::f64::consts::PI;
+    match t - stops {
+        since if since < 0.0 => [t, 1.0, 0.0],
+        since if since < 1.0 => [
+            stops + 0.5 * since + (PI * since).sin() / (2.0 * PI),
+            0.5 * (1.0 + (PI * since).cos()),
+            -0.5 * PI * (PI * since).sin(),
+        ],
+        _ => [stops + 0.5, 0.0, 0.0],
+    }
+}
+
+/// A log of 24 s at 100 Hz: position, velocity, torque, and a part of the torque called feed-forward.
 fn log(plant: &Plant) -> String {
     let robot = RobotFile::parse("arm.toml", ARM).unwrap().robot();
     let body = |mass: f64, x: f64| Body {
@@ -77,9 +97,10 @@ fn log(plant: &Plant) -> String {
         let sum = |of: &dyn Fn(f64, f64) -> f64| {
             waves.map(|w| w.iter().map(|(a, w)| of(*a, *w)).sum::<f64>())
         };
-        let q = sum(&|a, w| a * (w * t).sin());
-        let v = sum(&|a, w| a * w * (w * t).cos());
-        let a = sum(&|a, w| -a * w * w * (w * t).sin());
+        let [s, ds, dds] = phase(t, plant.stops);
+        let q = sum(&|a, w| a * (w * s).sin());
+        let v = sum(&|a, w| a * w * (w * s).cos() * ds);
+        let a = sum(&|a, w| a * w * ((w * s).cos() * dds - w * (w * s).sin() * ds * ds));
         let [from, to] = plant.load.1;
         let theta = &thetas[usize::from(from <= t && t < to)];
         let mut tau = [0.0; 2];
@@ -90,7 +111,7 @@ fn log(plant: &Plant) -> String {
                 .wrapping_add(1_442_695_040_888_963_407);
             plant.noise * ((chance >> 33) as f64 / f64::from(1u32 << 31) - 0.5)
         };
-        let ff = tau.map(|x| 0.5 * x);
+        let ff = tau.map(|x| plant.fed_forward * x);
         let [viscous, coulomb] = plant.friction;
         let tau: [f64; 2] = std::array::from_fn(|j| {
             tau[j] + viscous * v[j] + coulomb * (200.0 * v[j]).tanh() + noise()
@@ -235,11 +256,79 @@ fn the_law_of_a_drive_takes_all_that_it_is_asked_for_and_columns_that_it_leaves_
 }
 
 #[test]
+fn a_feed_forward_that_is_0_throughout_raises_no_doubt_named_or_not() {
+    let plant = Plant {
+        friction: [0.4, 0.8],
+        noise: 0.1,
+        fed_forward: 0.0,
+        ..FREE
+    };
+    let speed = ", velocity_command = \"dq_des_{joint}\"";
+    let named = ", feed_forward = \"tau_ff_{joint}\"";
+    for more in [speed.to_owned(), format!("{speed}{named}")] {
+        let law = format!("torque = {{ pd = [80.0, 3.0], command = \"q_des_{{joint}}\"{more} }}");
+        let folder = with_log(&plant, &law);
+        let (code, found, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
+        assert_eq!(code, 0, "{said}");
+        let all = found["parameters"].as_array().unwrap();
+        let is = |p: &&Value| p["key"] == "viscous" && p["joint"] == "a";
+        let viscous = all.iter().find(is).unwrap()["value"].as_f64().unwrap();
+        assert!((viscous - 0.4).abs() < 0.05, "{viscous}");
+        assert!(!said.contains("feed_forward"), "{said}");
+        assert!(!said.contains("tau_ff"), "{said}");
+        let (code, found, said) = run(folder.path(), "inspect log.csv -r arm.toml -v");
+        assert_eq!(code, 0, "{said}");
+        let faults = found["faults"].as_array().unwrap();
+        assert!(faults.is_empty(), "{faults:?}");
+    }
+    // one that is 0 until the last second is no such column
+    let law = format!("torque = {{ pd = [80.0, 3.0], command = \"q_des_{{joint}}\"{speed} }}");
+    let folder = with_log(&plant, &law);
+    let path = folder.path().join("log.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let last = |line: &str| match line.starts_with("23.5") {
+        true => format!("{},0.3,0.2", line.rsplitn(3, ',').last().unwrap()),
+        false => line.to_owned(),
+    };
+    let text: Vec<String> = text.lines().map(last).collect();
+    std::fs::write(&path, text.join("\n")).unwrap();
+    let (code, _, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("tau_ff_a, tau_ff_b"), "{said}");
+}
+
+#[test]
+fn a_load_that_is_carried_to_the_end_has_no_end_though_the_arm_rests_there() {
+    let plant = |load| Plant {
+        friction: [0.4, 0.8],
+        noise: 0.1,
+        load,
+        stops: 19.0,
+        ..FREE
+    };
+    let folder = with_log(&plant((0.0, [0.0; 2])), MEASURED);
+    let path = folder.path();
+    assert_eq!(run(path, "lsq log.csv -r arm.toml -o m.toml").0, 0);
+    std::fs::write(path.join("loaded.csv"), log(&plant((0.8, [9.0, 99.0])))).unwrap();
+    let (code, found, said) = run(path, "payload loaded.csv -m m.toml");
+    assert_eq!(code, 0, "{said}");
+    let spans = found["carried"].as_array().unwrap();
+    let [span] = spans.as_slice() else {
+        panic!("{spans:?}");
+    };
+    let from = span["from_s"].as_f64().unwrap();
+    assert!((from - 9.0).abs() < 0.2 && span["to_s"].is_null(), "{span}");
+    let mass = found["readings"][0]["mass"]["value"].as_f64().unwrap();
+    assert!((mass - 0.8).abs() < 0.03, "{mass}");
+}
+
+#[test]
 fn a_load_that_comes_and_goes_within_a_log_is_found_with_its_times() {
     let plant = |load| Plant {
         friction: [0.4, 0.8],
         noise: 0.1,
         load,
+        ..FREE
     };
     let folder = with_log(&plant((0.0, [0.0; 2])), MEASURED);
     let path = folder.path();

@@ -36,4 +36,4 @@ pub use gate::{InspectionGate, RowCutter};
 pub use judge::{InspectionDepth, LogJudge};
 pub use look::{ChannelColumn, ColumnPlan, look, look_again};
 pub use order::{OrderComparison, OrderFault};
-pub use words::ChannelRole;
+pub use words::{ChannelRole, commanded_role};

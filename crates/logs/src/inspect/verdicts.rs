@@ -266,7 +266,12 @@ fn jitter(judge: &LogJudge, clock: &ClockFacts, rows: EvenRows, draft: &mut Faul
         return;
     }
     let rate = match in_bursts {
-        true => rate_of_bursts(seen.rows as f64, seen.duration(), clock),
+        true => rate_of_bursts(
+            seen.rows as f64,
+            seen.duration(),
+            clock.dt,
+            clock.gaps.len(),
+        ),
         false => 1.0 / even.step_s,
     };
     let rate = round_within(rate, 0.01 * rate);
@@ -290,12 +295,17 @@ fn jitter(judge: &LogJudge, clock: &ClockFacts, rows: EvenRows, draft: &mut Faul
     draft.found.even_rate_hz = Some(rate);
 }
 
-/// The rate of so many rows that come in bursts: those of a burst over the time from one burst to the next \[Hz\].
-fn rate_of_bursts(rows: f64, duration_s: f64, clock: &ClockFacts) -> f64 {
-    let pauses = clock.gaps.len() as f64;
+/// The rate of so many rows that come in bursts, `step_s` apart in them: those of a burst over the time from one burst to
+/// the next, and of all rows on average where nothing is left between bursts \[Hz\].
+fn rate_of_bursts(rows: f64, duration_s: f64, step_s: f64, pauses: usize) -> f64 {
+    let pauses = pauses as f64;
     let of_burst = rows / (pauses + 1.0);
-    let between = (duration_s - (of_burst - 1.0) * clock.dt) / pauses.max(1.0);
-    of_burst / between
+    let between = (duration_s - (of_burst - 1.0) * step_s) / pauses;
+    // rows lie closer in a burst than they were sampled
+    match pauses > 0.0 && between > of_burst * step_s {
+        true => of_burst / between,
+        false => (rows - 1.0).max(1.0) / duration_s,
+    }
 }
 
 fn often(times: usize, what: &str) -> String {
@@ -397,4 +407,21 @@ fn number_faults(track: &ChannelTrack, messages: bool, draft: &mut FaultList) {
     let remedy = "choose a slower motion where the robot should follow its reference";
     let fault = (Info, FaultKind::Saturation, Some(track));
     draft.rows(fault, &track.at_limit, &effect, remedy);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rate_of_bursts;
+
+    #[test]
+    fn the_rate_of_bursts_is_theirs_and_that_of_all_rows_where_no_time_is_between_them() {
+        // ten bursts of five rows 1 ms apart, every 50 ms
+        let rate = rate_of_bursts(50.0, 0.454, 0.001, 9);
+        assert!((rate - 100.0).abs() < 1e-9, "{rate}");
+        // no pause, none that takes time, and rows that overlap
+        for (duration, step, pauses) in [(0.5, 0.01, 0), (0.5, 0.5 / 24.0, 1), (0.5, 0.1, 3)] {
+            let rate = rate_of_bursts(50.0, duration, step, pauses);
+            assert!((rate - 98.0).abs() < 1e-9, "{step} {pauses}: {rate}");
+        }
+    }
 }

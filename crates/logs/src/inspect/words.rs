@@ -202,6 +202,12 @@ pub fn is_command(words: &[NameWord]) -> bool {
             .any(|pair| desired(pair) || out(pair) || ahead(pair))
 }
 
+/// What a name says was commanded; `None` of what was measured.
+pub fn commanded_role(name: &str) -> Option<ChannelRole> {
+    let spoken = words(name);
+    is_command(&spoken).then(|| role(&spoken).unwrap_or(ChannelRole::Other))
+}
+
 /// Whether words are of what is about a channel and no channel itself, or of the tool and no joint.
 pub fn is_aside(words: &[NameWord]) -> bool {
     // UR's `tool_vector`, KUKA's `RIst.X`

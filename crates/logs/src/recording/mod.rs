@@ -9,8 +9,8 @@ pub use self::torque_course::TorqueCourse;
 use crate::inspect::speeds::SpeedMeter;
 use crate::inspect::{InspectionGate, RowCutter};
 use crate::log::{
-    Block, Instant, JointTemperatures, Layout, LogArrays, LogError, LogSpec, Provenance, Reader,
-    RowFault, RowStore,
+    Block, Instant, JointTemperatures, Layout, LogArrays, LogError, LogSpec, Provenance, RawBlock,
+    RawReader, Reader, RowFault, RowStore,
 };
 use cft_ident_core::motion::ZeroOrderHold;
 use cft_ident_core::robot::Robot;
@@ -291,12 +291,20 @@ impl Recording {
         }
     }
 
-    /// Names of the columns of its log, those of no channel among them; of a recording the fields that are read.
-    pub fn columns(&self) -> &[String] {
-        match &self.rows {
-            RecordedRows::Parsed(_, store, _) => store.names(),
-            RecordedRows::Arrays(..) => &[],
+    /// Names of columns of its log that `is_asked` takes, those of no channel among them, without those that are 0
+    /// throughout; of a recording of the fields that are read.
+    pub fn columns(&self, is_asked: &dyn Fn(&str) -> bool) -> Vec<String> {
+        let RecordedRows::Parsed(spec, store, layout) = &self.rows else {
+            return Vec::new();
+        };
+        let mut names: Vec<String> = store.names().to_vec();
+        names.retain(|name| is_asked(name));
+        // what comes through a pipe is not there a second time
+        if !names.is_empty() && store.files().iter().all(|file| file.is_file()) {
+            let zero = zero_throughout(spec, layout, &names).unwrap_or_default();
+            names.retain(|name| !zero.contains(name));
         }
+        names
     }
 
     /// The instant from which its times are counted.
@@ -391,4 +399,28 @@ impl RowBlocks {
     pub fn removed(&self) -> u64 {
         self.cutter.removed()
     }
+}
+
+/// Those of these columns of a log that hold zeros and no other number.
+fn zero_throughout(
+    spec: &LogSpec,
+    layout: &Layout,
+    names: &[String],
+) -> Result<Vec<String>, LogError> {
+    let mut raw = RawReader::open(spec, Some(layout))?;
+    let place = |name: &String| raw.names().iter().position(|of| of == name);
+    let places = names.iter().filter_map(|name| Some((place(name)?, name)));
+    let mut zero: Vec<(usize, &String)> = places.collect();
+    let mut block = RawBlock::default();
+    // a column of no number at all may be anything
+    let mut seen = vec![false; raw.names().len()];
+    while !zero.is_empty() && raw.read(&mut block)? {
+        zero.retain(|(column, _)| {
+            let mut numbers = block.columns[*column].iter().filter(|x| !x.is_nan());
+            seen[*column] |= numbers.clone().next().is_some();
+            numbers.all(|x| *x == 0.0)
+        });
+    }
+    let zero = zero.into_iter().filter(|(column, _)| seen[*column]);
+    Ok(zero.map(|(_, name)| name.clone()).collect())
 }

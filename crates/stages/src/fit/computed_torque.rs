@@ -9,9 +9,8 @@ use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
 use crate::note::{FitNote, StageNote};
 use cft_ident_core::inertia::columns::JointTerm;
-use cft_ident_logs::inspect::ChannelRole;
+use cft_ident_logs::inspect::{ChannelRole, commanded_role};
 use cft_ident_logs::log::escape;
-use cft_ident_logs::mapping::LogColumn;
 
 /// What no drive shows that was measured.
 struct NoDrive {
@@ -39,7 +38,7 @@ pub(crate) fn asked_for(setup: &RobotSetup, logs: &[LogData]) -> Option<FitNote>
     let logs = logs.iter().map(|log| log.recording().layout());
     let mut columns: Vec<String> = logs
         .flat_map(|layout| layout.torques.iter())
-        .filter(|channel| LogColumn::named(&channel.column).commanded)
+        .filter(|channel| commanded_role(&channel.column).is_some())
         .map(|channel| escape(&channel.column))
         .collect();
     columns.dedup();
@@ -47,7 +46,8 @@ pub(crate) fn asked_for(setup: &RobotSetup, logs: &[LogData]) -> Option<FitNote>
     (!columns.is_empty()).then_some(FitNote::AskedFor { columns })
 }
 
-/// Commanded velocities and torques that logs hold and the law of the controller leaves out, by the keys for them.
+/// Commanded velocities and torques that logs hold and the law of the controller leaves out, by the keys for them; what is
+/// 0 throughout adds nothing to it.
 pub(crate) fn unused_commands(
     setup: &RobotSetup,
     logs: &[LogData],
@@ -61,15 +61,15 @@ pub(crate) fn unused_commands(
         ("velocity_command", ChannelRole::Velocity),
         ("feed_forward", ChannelRole::Torque),
     ] {
-        let names = logs.iter().flat_map(|log| log.recording().columns());
-        let of = |name: &&String| {
-            let column = LogColumn::named(name);
-            column.commanded && column.role == role
-        };
-        let mut columns: Vec<String> = names.filter(of).map(|name| escape(name)).collect();
+        if used.contains(&key) {
+            continue;
+        }
+        let is_asked = |name: &str| commanded_role(name) == Some(role);
+        let names = logs.iter().map(|log| log.recording().columns(&is_asked));
+        let mut columns: Vec<String> = names.flatten().map(|name| escape(&name)).collect();
         columns.dedup();
         columns.truncate(setup.robot.joints());
-        if !columns.is_empty() && !used.contains(&key) {
+        if !columns.is_empty() {
             out.push((key, columns));
         }
     }

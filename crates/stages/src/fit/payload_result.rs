@@ -167,8 +167,13 @@ impl PayloadVerdict {
 }
 
 impl PayloadReading {
-    /// Takes numbers for what they are where they are known so much worse than in another reading that they say nothing.
+    /// Takes numbers for what they are where they are known so much worse than in another reading that they say nothing:
+    /// where the mass is one of them, so is all that is made with it.
     pub(super) fn forget_undetermined(&mut self, other: &Self) {
+        let is_open = |own: &IntervalNumber, other: &IntervalNumber| {
+            own.std > other.std.map(|std| OPEN * std)
+        };
+        let no_mass = is_open(&self.mass, &other.mass);
         let own = std::iter::once(&mut self.mass)
             .chain(&mut self.centre)
             .chain(&mut self.inertia);
@@ -176,7 +181,7 @@ impl PayloadReading {
             .chain(&other.centre)
             .chain(&other.inertia);
         for (own, other) in own.zip(others) {
-            if own.std > other.std.map(|std| OPEN * std) {
+            if no_mass || is_open(own, other) {
                 (own.value, own.std, own.interval_95) = (None, None, None);
             }
         }
