@@ -367,6 +367,34 @@ fn a_load_that_comes_and_goes_within_a_log_is_found_with_its_times() {
 }
 
 #[test]
+fn a_load_that_is_picked_up_is_no_course_over_time_to_a_diagnosis() {
+    let plant = |load| Plant {
+        friction: [0.4, 0.8],
+        noise: 0.1,
+        load,
+        ..FREE
+    };
+    let folder = with_log(&plant((0.0, [0.0; 2])), MEASURED);
+    let path = folder.path();
+    assert_eq!(run(path, "lsq log.csv -r arm.toml -o m.toml").0, 0);
+    let words = "carries a load";
+    for (load, from) in [
+        ((0.8, [10.0, 99.0]), Some("from 10.0")),
+        ((0.0, [0.0; 2]), None),
+    ] {
+        std::fs::write(path.join("loaded.csv"), log(&plant(load))).unwrap();
+        let (code, found, said) = run(path, "diagnose loaded.csv -m m.toml --keep -o d.toml -v");
+        assert_eq!(code, 0, "{said}");
+        assert_eq!(said.contains(words), from.is_some(), "{said}");
+        assert!(from.is_none_or(|from| said.contains(from)), "{said}");
+        assert!(!said.contains("contact?"), "{said}");
+        let steps = found["steps"].as_array().unwrap();
+        let named = steps.iter().filter(|step| step["effect"] == "gain-change");
+        assert_eq!(named.count(), 0, "{steps:?}");
+    }
+}
+
+#[test]
 fn what_is_held_out_is_a_part_that_the_filter_can_use() {
     let plant = Plant {
         friction: [0.4, 0.8],

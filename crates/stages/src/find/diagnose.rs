@@ -11,6 +11,7 @@ use crate::fit::contact::contacts;
 use crate::fit::known_friction::before_these;
 use crate::fit::own_fit::{OwnFit, OwnRefit};
 use crate::fit::prior::{information, moved_alone, open};
+use crate::fit::without_load::without_load;
 use crate::held_out::hold_out::{Held, hold_out, or_note};
 use crate::held_out::open_loop::spoiled;
 use crate::input::control::{Control, Progress};
@@ -159,13 +160,12 @@ pub fn diagnose(
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
     data.check_rows()?;
-    let setup = &data.setup;
     let (name, as_given) = (settings.model.name.as_str(), &settings.model.file);
     // what is looked for stands beside the plain fit
     let plain = as_given.as_fitted();
     let file = &plain;
     let given = refined(file, name)?;
-    settings.check_candidates(setup)?;
+    settings.check_candidates(&data.setup)?;
     let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
     let mut judged = file.parameters.iter().filter(judged).peekable();
     let determined = |p: &Parameter| matches!(p.verdict, Some(Verdict::Identified | Verdict::Weak));
@@ -174,9 +174,13 @@ pub fn diagnose(
             model: name.to_owned(),
         });
     }
-    if let Some(fault) = without_gains(setup).or(refused(&data.logs)?) {
+    if let Some(fault) = without_gains(&data.setup).or(refused(&data.logs)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
+    // what a load does to a part of a log looks like a course over time
+    let unloaded = without_load(data, settings.model, control)?;
+    let (data, loads) = (&unloaded.data, unloaded.notes);
+    let setup = &data.setup;
     let holdout = ("holdout", identities(&data.held_out));
     each_row_once(&[("fit", identities(&data.logs)), holdout])?;
     let groups = [
@@ -193,7 +197,9 @@ pub fn diagnose(
     let mut in_memory = read_each(setup, &each, &all, control)?;
     let contact = contacts(setup, &data.logs, control)?;
     unseen_by((name, as_given), &in_memory.inputs[data.logs.len()..])?;
-    in_memory.notes.splice(0..0, contact.iter().cloned());
+    in_memory
+        .notes
+        .splice(0..0, loads.into_iter().chain(contact.iter().cloned()));
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
         &settings.candidates,

@@ -24,3 +24,4 @@ pub(crate) mod payload_rows;
 pub(crate) mod prior;
 pub(crate) mod replayed_torque;
 pub(crate) mod weakest;
+pub(crate) mod without_load;

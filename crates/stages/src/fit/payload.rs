@@ -11,13 +11,14 @@ use super::carried::carried;
 use super::gains::LSQ_WITH_GAINS;
 use super::payload_result::{
     CarriedSpan, GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
+    UNUSUAL,
 };
 use super::payload_rows::{BLOCK_S, HAT, LEFT, OWN, Rows, places, rows};
 use crate::band::NORMAL_95;
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
-use crate::input::in_memory::read_whole;
+use crate::input::in_memory::{InMemory, read_whole};
 use crate::input::log_data::LogData;
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{ModelNote, StageNote};
@@ -65,14 +66,8 @@ pub fn payload(
     let whole = read_whole(setup, logs, control)?;
     setup.check_temperatures(model, logs, &whole.stretches)?;
     let work = control.begin("payload", None);
-    let smear_s = setup.settings().cutoff_hz.recip();
-    let of = |spans: &[CarriedSpan]| rows(setup, model, &whole, name, (spans, smear_s), control);
-    let mut rows = of(&[])?;
     let names: Vec<String> = logs.iter().map(LogData::name).collect();
-    let carried = carried(&rows, &names);
-    if !carried.is_empty() {
-        rows = of(&carried)?;
-    }
+    let (rows, carried) = rows_of_load(setup, model, &whole, (name, &names), control)?;
     let covariance = inertial_covariance(file, model);
     let declared = has_declared_gains(file);
     let common = if declared { GAIN_DEVIATION } else { 0.0 };
@@ -100,6 +95,52 @@ pub fn payload(
         samples: rows.joints.iter().map(|rows| rows.len() as u64).sum(),
         inputs: whole.inputs,
         notes,
+    })
+}
+
+/// Parts of logs in which a body is carried that explains what the model leaves of all joints there; nothing where a body
+/// is carried throughout, or none.
+pub(crate) fn carried_in(
+    setup: &RobotSetup,
+    logs: &[LogData],
+    given: &GivenModel,
+    control: &Control,
+) -> Result<Vec<CarriedSpan>, IdentifyError> {
+    let (file, model) = (&given.file, &given.numbers()?);
+    let whole = read_whole(setup, logs, control)?;
+    setup.check_temperatures(model, logs, &whole.stretches)?;
+    let names: Vec<String> = logs.iter().map(LogData::name).collect();
+    let (rows, carried) = rows_of_load(setup, model, &whole, (&given.name, &names), control)?;
+    if carried.is_empty() {
+        return Ok(carried);
+    }
+    let held = reading(
+        setup,
+        &rows,
+        &inertial_covariance(file, model),
+        (false, 0.0),
+    )?;
+    let is_body = held.mass.is_above_zero();
+    let unusual = unusual(&rows, &[held], file);
+    let explains = is_body && unusual.is_none_or(|times| times <= UNUSUAL);
+    Ok(if explains { carried } else { Vec::new() })
+}
+
+/// The rows in which a body is looked for, and the parts of the logs in which it acts.
+fn rows_of_load(
+    setup: &RobotSetup,
+    model: &AugmentedModel,
+    whole: &InMemory,
+    (name, logs): (&str, &[String]),
+    control: &Control,
+) -> Result<(Rows, Vec<CarriedSpan>), IdentifyError> {
+    let smear_s = setup.settings().cutoff_hz.recip();
+    let of = |spans: &[CarriedSpan]| rows(setup, model, whole, name, (spans, smear_s), control);
+    let rows = of(&[])?;
+    let carried = carried(&rows, logs);
+    Ok(match carried.is_empty() {
+        true => (rows, carried),
+        false => (of(&carried)?, carried),
     })
 }
 

@@ -13,7 +13,7 @@ use cft_ident_logs::log::Provenance;
 
 /// Times the usual error of a model from which on its absence explains nothing: other logs of a machine leave twice as
 /// much. Half: no log of another day is without a payload; twice: a load of a tenth of the arm passes for none.
-const UNUSUAL: f64 = 4.0;
+pub(super) const UNUSUAL: f64 = 4.0;
 /// Times the deviation of the other reading from which on a number is not determined.
 const OPEN: f64 = 1000.0;
 
@@ -136,7 +136,7 @@ pub struct Payload {
 
 impl IntervalNumber {
     /// Whether the interval lies above zero; false where there is none.
-    fn is_above_zero(&self) -> bool {
+    pub(super) fn is_above_zero(&self) -> bool {
         self.interval_95.is_some_and(|[low, _]| low > 0.0)
     }
 

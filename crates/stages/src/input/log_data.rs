@@ -78,6 +78,27 @@ impl LogData {
         })
     }
 
+    /// The same log without some parts of it, in seconds after its first row; as it is where it is no file.
+    pub(crate) fn without(
+        &self,
+        setup: &RobotSetup,
+        parts: &[[f64; 2]],
+        control: &Control,
+    ) -> Result<Self, IdentifyError> {
+        let Log::File(spec) = &self.source else {
+            return Ok(self.clone());
+        };
+        let mut spec = spec.clone();
+        spec.leave_out.extend(parts);
+        let layout = setup.file.layout();
+        let part = Self::read_by(setup, &Log::File(spec), &layout, &[self], control)?;
+        let recording = Arc::unwrap_or_clone(part.recording).minus_torque_of(&self.recording);
+        Ok(LogData {
+            recording: Arc::new(recording),
+            ..part
+        })
+    }
+
     fn read_by(
         setup: &RobotSetup,
         log: &Log,

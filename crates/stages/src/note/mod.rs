@@ -214,6 +214,14 @@ pub enum FitNote {
         /// What is to be left out, with room for the filters \[s\].
         leave_out: [f64; 2],
     },
+    /// A load is carried in a part of a log, which is left out.
+    LoadLeftOut {
+        log: String,
+        /// From its first row on \[s\]; none where it is there from the beginning.
+        from_s: Option<f64>,
+        /// The same; none where it stays to the end.
+        to_s: Option<f64>,
+    },
     /// Samples at rest are left out: shares by joints.
     AtRest { joints: Vec<(String, f64)> },
     /// Parameters are other ones where spikes are not bridged: each with the bridges and without.

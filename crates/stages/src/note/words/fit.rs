@@ -76,6 +76,18 @@ impl Display for FitNote {
                 joints.join(", "),
                 significant(*ratio, 2)
             ),
+            Self::LoadLeftOut { log, from_s, to_s } => {
+                let when = match (from_s, to_s) {
+                    (Some(from), Some(to)) => format!("from {from:.2} to {to:.2} s"),
+                    (Some(from), None) => format!("from {from:.2} s to the end"),
+                    (None, Some(to)) => format!("up to {to:.2} s"),
+                    (None, None) => "throughout".to_owned(),
+                };
+                write!(
+                    f,
+                    "{log}: the last link carries a load {when} that it does not carry in the rest, and these rows are left out; `cft-ident payload` with the same log and model gives its mass"
+                )
+            }
             Self::AtRest { joints } => write!(
                 f,
                 "samples at rest or at a reversal were ignored: {}; friction takes any value up to its Coulomb level there",
