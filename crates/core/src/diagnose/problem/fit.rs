@@ -4,10 +4,11 @@ use nalgebra::DVector;
 
 use super::case::DiagnosisCase;
 use super::pass::{ColumnLayout, WeightedRows, pass};
-use super::unknowns::{DiagnosisUnknowns, step};
+use super::unknowns::{DiagnosisUnknowns, Unknown, step, value_of};
 use crate::effect::AugmentedModel;
 use crate::judge::{BlockSums, Terms, TimeBlock};
 use crate::motion::MotionError;
+use crate::robot::model::JointFriction;
 
 /// A fitted model with the weights of its joints.
 #[derive(Debug, Clone)]
@@ -71,15 +72,27 @@ fn weights_of(squares: &[f64], rows: &[f64]) -> Vec<f64> {
     squares.iter().zip(rows).map(of).collect()
 }
 
-/// The terms of the declared unknowns about a model, with no weights yet.
+/// The terms of the declared unknowns about a model, with no weights yet. Friction that did not push does not come to push.
 pub fn declared_terms(
     case: &DiagnosisCase,
     unknowns: &DiagnosisUnknowns,
     layout: &ColumnLayout,
     model: &AugmentedModel,
 ) -> Terms {
+    let mut list = layout.declared.clone();
+    for (term, unknown) in list.iter_mut().zip(&unknowns.list) {
+        if let Unknown::Friction { joint, .. } = unknown
+            && matches!(
+                model.model.friction[*joint],
+                JointFriction::ViscousCoulomb(_)
+            )
+            && value_of(&case.given, *unknown) >= 0.0
+        {
+            term.bound.least = -value_of(model, *unknown).max(0.0);
+        }
+    }
     Terms {
-        list: layout.declared.clone(),
+        list,
         weights: vec![0.0; layout.torques.len()],
         prior: case.prior.over(unknowns, model),
         ridge: case.numbers.ridge,

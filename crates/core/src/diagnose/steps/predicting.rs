@@ -10,14 +10,13 @@ use crate::diagnose::outcome::{JudgedEffects, NotWritten, PredictingTerm};
 use crate::diagnose::prepared::{PreparedCase, SummedProducts};
 use crate::diagnose::problem::data_split::LogRole;
 use crate::diagnose::problem::prediction_numbers::PredictionNumbers;
-use crate::diagnose::problem::unknowns::{DiagnosisUnknowns, Unknown, step, value_of};
+use crate::diagnose::problem::unknowns::{DiagnosisUnknowns, Unknown, step};
 use crate::diagnose::search::{ChosenCandidate, own_joint};
 use crate::diagnose::searched::SearchedCase;
 use crate::diagnose::tables::{EffectEstimates, VerifiedEffect, beside_the_others};
 use crate::diagnose::watch::DiagnosisWatch;
 use crate::effect::{AugmentedModel, ModelEffect};
 use crate::judge::{BlockSums, Bound, Numbers, Terms, compare, divide};
-use crate::robot::model::JointFriction;
 
 mod choose;
 mod stretches;
@@ -56,7 +55,7 @@ pub fn write_for_prediction(
     let blocks = [fitted.as_slice(), &held].concat();
     let mut summed = prepared.summed_over(about, &list, (&directions, &blocks))?;
     let held = summed.sums.split_off(fitted.len());
-    hold_bodies(&mut summed.declared, &prepared.unknowns, &summed.about);
+    hold_bodies(&mut summed.declared, &prepared.unknowns);
     let chosen = prepared.field(&list, &summed).choose_predicting(watch)?;
     let mut terms: Vec<PendingEffect> = chosen.into_iter().map(PendingEffect::of).collect();
     if terms.is_empty() {
@@ -356,25 +355,18 @@ impl EffectJudge<'_> {
     }
 }
 
-/// Holds the bodies of a model; the friction of each joint moves beside a term on it, and does not come to push.
-fn hold_bodies(declared: &mut Terms, unknowns: &DiagnosisUnknowns, about: &AugmentedModel) {
+/// Holds the bodies of a model.
+fn hold_bodies(declared: &mut Terms, unknowns: &DiagnosisUnknowns) {
     for (i, (term, unknown)) in declared.list.iter_mut().zip(&unknowns.list).enumerate() {
-        match unknown {
-            Unknown::Theta(_) => {
-                term.columns.clear();
-                term.bound = Bound::NIL;
-                if i < declared.prior.1.len() {
-                    declared.prior.0.row_mut(i).fill(0.0);
-                    declared.prior.0.column_mut(i).fill(0.0);
-                    declared.prior.1[i] = 0.0;
-                }
-            }
-            Unknown::Friction { joint, .. } => {
-                if let JointFriction::ViscousCoulomb(_) = about.model.friction[*joint] {
-                    term.bound.least = -value_of(about, *unknown).max(0.0);
-                }
-            }
-            Unknown::Offset(_) => {}
+        if !matches!(unknown, Unknown::Theta(_)) {
+            continue;
+        }
+        term.columns.clear();
+        term.bound = Bound::NIL;
+        if i < declared.prior.1.len() {
+            declared.prior.0.row_mut(i).fill(0.0);
+            declared.prior.0.column_mut(i).fill(0.0);
+            declared.prior.1[i] = 0.0;
         }
     }
 }
