@@ -250,8 +250,12 @@ impl PreparedCase<'_> {
                 .amplitude(&place.terms, (None, false), numbers);
             found.s > 0.0
         });
-        let effects = sure.map(|(c, _)| candidates[c.candidate].effect.clone());
-        Ok(effects.collect())
+        let law = |c: &ChosenCandidate| {
+            let mut law = candidates[c.candidate].effect.clone();
+            law.linear.fill(0.0);
+            law
+        };
+        Ok(sure.map(|(c, _)| law(c)).collect())
     }
 
     /// Adds the effects that the user wants, each in the shape that gains most; what cannot stand beside one leaves.
