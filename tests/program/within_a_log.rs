@@ -49,6 +49,13 @@ const FREE: Plant = Plant {
     stops: 99.0,
 };
 
+/// A drive that was measured.
+const REAL: Plant = Plant {
+    friction: [0.4, 0.8],
+    noise: 0.1,
+    ..FREE
+};
+
 /// Phase of the motion, its rate and acceleration by the time: the time, until the arm stops.
 fn phase(t: f64, stops: f64) -> [f64; 3] {
     use std::f64::consts::PI;
@@ -153,6 +160,21 @@ fn with_log(plant: &Plant, head: &str) -> tempfile::TempDir {
     folder
 }
 
+/// A folder with the log of an arm and the model `m.toml` of it.
+fn fitted(plant: &Plant) -> tempfile::TempDir {
+    let folder = with_log(plant, MEASURED);
+    let (code, _, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml");
+    assert_eq!(code, 0, "{said}");
+    folder
+}
+
+/// A parameter of a fit.
+fn value(found: &Value, key: &str, joint: &str) -> f64 {
+    let all = found["parameters"].as_array().unwrap();
+    let is = |p: &&Value| p["key"] == key && p["joint"] == joint;
+    all.iter().find(is).unwrap()["value"].as_f64().unwrap()
+}
+
 /// The words of a warning that doubts torques by their data.
 const NO_DRIVE: &str = "no drive was ever measured so";
 /// And by their names.
@@ -186,11 +208,7 @@ fn a_torque_that_no_drive_gives_is_doubted_by_data_and_by_name_and_fitted_all_th
 
 #[test]
 fn torques_that_a_program_played_in_logs_of_other_motions_are_no_measurement() {
-    let plant = |noise| Plant {
-        friction: [0.4, 0.8],
-        noise,
-        ..FREE
-    };
+    let plant = |noise| Plant { noise, ..REAL };
     let folder = with_log(&plant(0.1), MEASURED);
     let words = "equal to the last digit";
     let lsq = || {
@@ -221,24 +239,14 @@ fn torques_that_a_program_played_in_logs_of_other_motions_are_no_measurement() {
 
 #[test]
 fn the_law_of_a_drive_takes_all_that_it_is_asked_for_and_columns_that_it_leaves_out_are_named() {
-    let plant = Plant {
-        friction: [0.4, 0.8],
-        noise: 0.1,
-        ..FREE
-    };
     let law = |more: &str| {
         let law = format!("torque = {{ pd = [80.0, 3.0], command = \"q_des_{{joint}}\"{more} }}");
-        let folder = with_log(&plant, &law);
+        let folder = with_log(&REAL, &law);
         run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v")
     };
     let (code, found, said) =
         law(", velocity_command = \"dq_des_{joint}\", feed_forward = [\"tau_ff_a\", \"tau_ff_b\"]");
     assert_eq!(code, 0, "{said}");
-    let value = |found: &Value, key: &str, joint: &str| {
-        let all = found["parameters"].as_array().unwrap();
-        let is = |p: &&Value| p["key"] == key && p["joint"] == joint;
-        all.iter().find(is).unwrap()["value"].as_f64().unwrap()
-    };
     assert!((value(&found, "viscous", "a") - 0.4).abs() < 0.05);
     assert!((value(&found, "coulomb", "b") - 0.8).abs() < 0.1);
     assert!(!said.contains("leaves out columns"), "{said}");
@@ -258,10 +266,8 @@ fn the_law_of_a_drive_takes_all_that_it_is_asked_for_and_columns_that_it_leaves_
 #[test]
 fn a_feed_forward_that_is_0_throughout_raises_no_doubt_named_or_not() {
     let plant = Plant {
-        friction: [0.4, 0.8],
-        noise: 0.1,
         fed_forward: 0.0,
-        ..FREE
+        ..REAL
     };
     let speed = ", velocity_command = \"dq_des_{joint}\"";
     let named = ", feed_forward = \"tau_ff_{joint}\"";
@@ -270,9 +276,7 @@ fn a_feed_forward_that_is_0_throughout_raises_no_doubt_named_or_not() {
         let folder = with_log(&plant, &law);
         let (code, found, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
         assert_eq!(code, 0, "{said}");
-        let all = found["parameters"].as_array().unwrap();
-        let is = |p: &&Value| p["key"] == "viscous" && p["joint"] == "a";
-        let viscous = all.iter().find(is).unwrap()["value"].as_f64().unwrap();
+        let viscous = value(&found, "viscous", "a");
         assert!((viscous - 0.4).abs() < 0.05, "{viscous}");
         assert!(!said.contains("feed_forward"), "{said}");
         assert!(!said.contains("tau_ff"), "{said}");
@@ -300,15 +304,12 @@ fn a_feed_forward_that_is_0_throughout_raises_no_doubt_named_or_not() {
 #[test]
 fn a_load_that_is_carried_to_the_end_has_no_end_though_the_arm_rests_there() {
     let plant = |load| Plant {
-        friction: [0.4, 0.8],
-        noise: 0.1,
         load,
         stops: 19.0,
-        ..FREE
+        ..REAL
     };
-    let folder = with_log(&plant((0.0, [0.0; 2])), MEASURED);
+    let folder = fitted(&plant((0.0, [0.0; 2])));
     let path = folder.path();
-    assert_eq!(run(path, "lsq log.csv -r arm.toml -o m.toml").0, 0);
     std::fs::write(path.join("loaded.csv"), log(&plant((0.8, [9.0, 99.0])))).unwrap();
     let (code, found, said) = run(path, "payload loaded.csv -m m.toml");
     assert_eq!(code, 0, "{said}");
@@ -324,15 +325,9 @@ fn a_load_that_is_carried_to_the_end_has_no_end_though_the_arm_rests_there() {
 
 #[test]
 fn a_load_that_comes_and_goes_within_a_log_is_found_with_its_times() {
-    let plant = |load| Plant {
-        friction: [0.4, 0.8],
-        noise: 0.1,
-        load,
-        ..FREE
-    };
-    let folder = with_log(&plant((0.0, [0.0; 2])), MEASURED);
+    let plant = |load| Plant { load, ..REAL };
+    let folder = fitted(&REAL);
     let path = folder.path();
-    assert_eq!(run(path, "lsq log.csv -r arm.toml -o m.toml").0, 0);
     for (load, from, to) in [
         ((0.8, [8.0, 16.0]), Some(8.0), Some(16.0)),
         ((0.8, [9.0, 99.0]), Some(9.0), None),
@@ -368,15 +363,9 @@ fn a_load_that_comes_and_goes_within_a_log_is_found_with_its_times() {
 
 #[test]
 fn a_load_that_is_picked_up_is_no_course_over_time_to_a_diagnosis() {
-    let plant = |load| Plant {
-        friction: [0.4, 0.8],
-        noise: 0.1,
-        load,
-        ..FREE
-    };
-    let folder = with_log(&plant((0.0, [0.0; 2])), MEASURED);
+    let plant = |load| Plant { load, ..REAL };
+    let folder = fitted(&REAL);
     let path = folder.path();
-    assert_eq!(run(path, "lsq log.csv -r arm.toml -o m.toml").0, 0);
     let words = "carries a load";
     for (load, from) in [
         ((0.8, [10.0, 99.0]), Some("from 10.0")),
@@ -396,12 +385,7 @@ fn a_load_that_is_picked_up_is_no_course_over_time_to_a_diagnosis() {
 
 #[test]
 fn what_is_held_out_is_a_part_that_the_filter_can_use() {
-    let plant = Plant {
-        friction: [0.4, 0.8],
-        noise: 0.1,
-        ..FREE
-    };
-    let folder = with_log(&plant, MEASURED);
+    let folder = with_log(&REAL, MEASURED);
     let path = folder.path().join("log.csv");
     let whole = std::fs::read_to_string(&path).unwrap();
     // the last quarter holds short tests alone
@@ -411,9 +395,8 @@ fn what_is_held_out_is_a_part_that_the_filter_can_use() {
     };
     let text: Vec<&str> = whole.lines().filter(kept).collect();
     std::fs::write(&path, text.join("\n")).unwrap();
-    let (code, found, said) = run(folder.path(), "identify log.csv arm.toml -o run");
+    let (code, _, said) = run(folder.path(), "identify log.csv arm.toml -o run");
     assert_eq!(code, 0, "{said}");
-    let _ = found;
     let result = std::fs::read_to_string(folder.path().join("run/result.json")).unwrap();
     let result: Value = serde_json::from_str(&result).unwrap();
     assert!(!result["validate"].is_null(), "{said}");

@@ -34,6 +34,20 @@ struct Point {
     slopes: Vec<Term>,
 }
 
+/// The candidates, of which those that are chosen alone have columns.
+pub fn with_columns_of(
+    candidates: &[EffectCandidate],
+    chosen: &[ChosenCandidate],
+) -> Vec<EffectCandidate> {
+    let mut list = candidates.to_vec();
+    for (i, candidate) in list.iter_mut().enumerate() {
+        if !chosen.iter().any(|c| c.candidate == i) {
+            candidate.clear_columns();
+        }
+    }
+    list
+}
+
 impl PreparedCase<'_> {
     /// Moves the shapes of chosen candidates to where all blocks want them: sums of these alone, about the model fitted with them.
     pub fn polished(
@@ -45,12 +59,7 @@ impl PreparedCase<'_> {
     ) -> Result<SummedProducts, MotionError> {
         let field = self.field(candidates, summed);
         let values = field.terms(chosen).fit(&field.total(), &[]).values;
-        let mut list = candidates.to_vec();
-        for (i, candidate) in list.iter_mut().enumerate() {
-            if !chosen.iter().any(|c| c.candidate == i) {
-                candidate.clear_columns();
-            }
-        }
+        let list = with_columns_of(candidates, chosen);
         let start = self.there(&list, chosen, &values, &[]);
         let begun = self.point(summed.about.clone(), start, (chosen, directions))?;
         let mut step = |from: &Point, damping: f64| {
@@ -103,7 +112,7 @@ impl PreparedCase<'_> {
         let all = field.terms(chosen).with(&from.slopes);
         let mut bent = self.bent();
         bent.extend(from.values.len()..all.len());
-        all.fit_damped(&field.total(), (&bent, damping)).values
+        all.damped_values(&field.total(), (&bent, damping))
     }
 
     /// Candidates with the amplitudes of a fit, a step on.

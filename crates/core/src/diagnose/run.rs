@@ -88,14 +88,14 @@ impl PreparedCase<'_> {
         let mut judged = judge(self, &searched)?;
         for _ in 0..SETTLINGS {
             watch.unless_stopped()?;
-            let Some(again) = self.without_those_that_left(&searched, &judged.steps)? else {
-                break;
-            };
             let stand = |of: &JudgedEffects| -> Vec<bool> {
                 of.steps.iter().map(|s| s.written.is_some()).collect()
             };
+            if !self.forget_those_that_left(&mut searched, &judged.steps)? {
+                break;
+            }
             let before = stand(&judged);
-            (judged, searched) = (judge(self, &again)?, again);
+            judged = judge(self, &searched)?;
             if stand(&judged) == before {
                 break;
             }

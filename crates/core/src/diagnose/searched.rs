@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::candidates::{EffectCandidate, NotTried, candidates, exclude, is_friction_law};
 use super::error::DiagnoseError;
 use super::outcome::FoundEffect;
+use super::polish::with_columns_of;
 use super::prepared::{PreparedCase, SummedProducts};
 use super::problem::case::AcceptedEffect;
 use super::problem::fit::{declared_terms, determines_some};
@@ -183,51 +184,42 @@ impl PreparedCase<'_> {
         })
     }
 
-    /// The same with the shapes that those effects want which stand, now that the others left, and without numbers that a
-    /// law can do without and these data do not show; none where that moves nothing.
-    pub fn without_those_that_left(
+    /// Gives effects that stand the shapes that they want now that the others left, and takes out numbers that a law can do
+    /// without and these data do not show; whether that moved anything.
+    pub fn forget_those_that_left(
         &self,
-        searched: &SearchedCase,
+        searched: &mut SearchedCase,
         judged: &[FoundEffect],
-    ) -> Result<Option<SearchedCase>, MotionError> {
-        let mut candidates = searched.candidates.clone();
+    ) -> Result<bool, MotionError> {
         let chosen = searched.chosen.iter().zip(judged);
         let standing: Vec<_> = chosen.filter(|(_, step)| step.written.is_some()).collect();
         let bends = |c: &ChosenCandidate| !searched.candidates[c.candidate].slopes.is_empty();
         let mut moves =
             standing.len() < judged.len() && standing.iter().any(|(chosen, _)| bends(chosen));
         for (chosen, step) in &standing {
-            let EffectCandidate { bounds, effect, .. } = &mut candidates[chosen.candidate];
+            let own = &mut searched.candidates[chosen.candidate];
             for k in needless(step, self.case.numbers.screen) {
-                moves |= bounds[k] != Bound::NIL;
-                bounds[k] = Bound::NIL;
-                effect.held[step.estimate.shape.len() + k] = true;
+                moves |= own.bounds[k] != Bound::NIL;
+                own.bounds[k] = Bound::NIL;
+                own.effect.held[step.estimate.shape.len() + k] = true;
             }
         }
         if !moves {
-            return Ok(None);
+            return Ok(false);
         }
         let standing: Vec<ChosenCandidate> = standing.iter().map(|(c, _)| (*c).clone()).collect();
-        let directions = &searched.directions;
-        let found = self.polished(&mut candidates, &searched.summed, &standing, directions)?;
-        let mut asked = candidates.clone();
-        for (i, candidate) in asked.iter_mut().enumerate() {
-            if !searched.chosen.iter().any(|c| c.candidate == i) {
-                candidate.clear_columns();
-            }
-        }
-        let summed = self.summed(found.about, &asked, directions)?;
-        Ok(Some(SearchedCase {
-            noisier: Some(self.noisier(&summed, &asked)?),
-            summed,
+        let SearchedCase {
             candidates,
-            chosen: searched.chosen.clone(),
-            not_tried: searched.not_tried.clone(),
-            looked: searched.looked.clone(),
-            directions: directions.clone(),
-            error: searched.error,
-            determined: searched.determined,
-        }))
+            summed,
+            directions,
+            chosen,
+            ..
+        } = &mut *searched;
+        let found = self.polished(candidates, summed, &standing, directions)?;
+        let asked = with_columns_of(candidates, chosen);
+        *summed = self.summed(found.about, &asked, directions)?;
+        searched.noisier = Some(self.noisier(summed, &asked)?);
+        Ok(true)
     }
 
     /// Friction laws in their best shape that are sure, with no amplitude.

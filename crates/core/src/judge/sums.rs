@@ -164,7 +164,7 @@ impl Terms {
     /// Fits all terms to joints' sums, some of them held.
     pub fn fit(&self, sums: &[DMatrix<f64>], held: &[(usize, f64)]) -> TermFit {
         let (normal, right) = self.firmed(sums);
-        let mut bounds: Vec<Bound> = self.list.iter().map(|t| t.bound).collect();
+        let mut bounds = self.bounds();
         for (i, x) in held {
             bounds[*i] = Bound {
                 least: *x,
@@ -178,22 +178,21 @@ impl Terms {
         }
     }
 
-    /// Fits all terms to joints' sums, some of them kept near 0 by so many parts of their own diagonal.
-    pub(crate) fn fit_damped(
+    /// Values of all terms fitted to joints' sums, some of them kept near 0 by so many parts of their own diagonal.
+    pub(crate) fn damped_values(
         &self,
         sums: &[DMatrix<f64>],
         (damped, damping): (&[usize], f64),
-    ) -> TermFit {
+    ) -> DVector<f64> {
         let (mut normal, right) = self.firmed(sums);
         for i in damped {
             normal[(*i, *i)] *= 1.0 + damping;
         }
-        let bounds: Vec<Bound> = self.list.iter().map(|t| t.bound).collect();
-        let values = bounded::solve(&normal, &right, &bounds);
-        TermFit {
-            squares: self.squares(sums, &values),
-            values,
-        }
+        bounded::solve(&normal, &right, &self.bounds())
+    }
+
+    fn bounds(&self) -> Vec<Bound> {
+        self.list.iter().map(|t| t.bound).collect()
     }
 
     /// Information matrix of the terms: that of joints' sums and of what is known beforehand, in weighted rows.

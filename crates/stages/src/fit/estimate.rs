@@ -96,7 +96,7 @@ pub struct InertialEstimate {
     pub fit: Fit,
     /// Covariance of the unknowns and of the known friction of each joint, in this order.
     pub covariance: DMatrix<f64>,
-    /// Joints whose known friction the rows contradict, and whose own rows are left out.
+    /// Joints whose known friction the rows contradict, and which is no prior there.
     pub contradicted: Vec<usize>,
     /// What noise of the positions makes of the unknowns, where that is known.
     pub bias: Option<DVector<f64>>,

@@ -11,6 +11,7 @@ use crate::diagnose::outcome::JudgedEffects;
 use crate::diagnose::outcome::{
     FormulaEnd, FormulaSymmetry, FoundEffect, FoundFormula, StepStatus,
 };
+use crate::diagnose::polish::with_columns_of;
 use crate::diagnose::prepared::PreparedCase;
 use crate::diagnose::problem::case::formula_name;
 use crate::diagnose::problem::pass::EffectCandidate;
@@ -90,12 +91,7 @@ impl PreparedCase<'_> {
             taken.iter().all(|p| p.beside.iter().any(same))
         };
         let mut chosen: Vec<ChosenCandidate> = confirmed.iter().filter(stays).cloned().collect();
-        let mut candidates = searched.candidates.clone();
-        for (i, candidate) in candidates.iter_mut().enumerate() {
-            if !chosen.iter().any(|c| c.candidate == i) {
-                candidate.clear_columns();
-            }
-        }
+        let mut candidates = with_columns_of(&searched.candidates, &chosen);
         for p in taken {
             chosen.push(ChosenCandidate {
                 candidate: candidates.len(),
