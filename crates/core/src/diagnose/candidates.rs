@@ -133,7 +133,7 @@ fn candidate(
     })
 }
 
-/// Shapes that are refined, with how far each may go from where it is.
+/// Shapes that are refined, with how far each may go from where it is; one that is held at the value of physics stays.
 pub fn refined_shapes(
     model: &AugmentedModel,
     case: &DiagnosisCase,
@@ -141,6 +141,9 @@ pub fn refined_shapes(
     effect: &ModelEffect,
 ) -> Vec<(usize, Bound)> {
     let ranges = shape_ranges(model, case, cover, effect).into_iter();
+    let is_held =
+        |k: usize, range: &ShapeSpan| effect.held[k] && range.physics == Some(effect.shape[k]);
+    let free = ranges.enumerate().filter(|(k, range)| !is_held(*k, range));
     let of = |(k, range): (usize, ShapeSpan)| {
         let here = effect.shape[k];
         let bound = Bound {
@@ -149,7 +152,22 @@ pub fn refined_shapes(
         };
         (k, bound)
     };
-    ranges.enumerate().map(of).collect()
+    free.map(of).collect()
+}
+
+/// The first shape that stands at an end of its range and that physics gives a value, with that.
+pub fn shape_by_physics(
+    model: &AugmentedModel,
+    case: &DiagnosisCase,
+    cover: &LogCoverage,
+    effect: &ModelEffect,
+) -> Option<(usize, f64)> {
+    let ranges = shape_ranges(model, case, cover, effect).into_iter();
+    let mut ends = ranges.enumerate().filter_map(|(k, range)| {
+        range.end_at(effect.shape[k])?;
+        Some((k, range.physics?))
+    });
+    ends.next()
 }
 
 /// Ranges of the shapes that are refined, within what its numbers must be.

@@ -5,7 +5,7 @@
 
 use nalgebra::DVector;
 
-use super::candidates::{EffectCandidate, refined_shapes};
+use super::candidates::{EffectCandidate, refined_shapes, shape_by_physics};
 use super::prepared::{PreparedCase, SummedProducts, moved};
 use super::problem::unknowns::Unknown;
 use super::search::ChosenCandidate;
@@ -49,13 +49,39 @@ pub fn with_columns_of(
 }
 
 impl PreparedCase<'_> {
-    /// Moves the shapes of chosen candidates to where all blocks want them: sums of these alone, about the model fitted with them.
+    /// Moves the shapes of chosen candidates to where all blocks want them: sums of these alone, about the model fitted with
+    /// them. A shape that runs to an end of its range is held at the value that physics gives it, where there is one.
     pub fn polished(
         &self,
         candidates: &mut [EffectCandidate],
         summed: &SummedProducts,
         chosen: &[ChosenCandidate],
         directions: &[ModelEffect],
+    ) -> Result<SummedProducts, MotionError> {
+        let polished = self.moved_to_minimum(candidates, summed, (chosen, directions))?;
+        let mut held = false;
+        for c in chosen {
+            let own = &mut candidates[c.candidate];
+            let model = &self.fitted.model;
+            let by_physics = shape_by_physics(model, self.case, &self.cover, &own.effect);
+            if let Some((k, value)) = by_physics {
+                (own.effect.shape[k], own.effect.held[k], held) = (value, true, true);
+                own.slopes = refined_shapes(model, self.case, &self.cover, &own.effect);
+            }
+        }
+        if !held {
+            return Ok(polished);
+        }
+        let asked = with_columns_of(candidates, chosen);
+        let again = self.summed(polished.about, &asked, directions)?;
+        self.moved_to_minimum(candidates, &again, (chosen, directions))
+    }
+
+    fn moved_to_minimum(
+        &self,
+        candidates: &mut [EffectCandidate],
+        summed: &SummedProducts,
+        (chosen, directions): (&[ChosenCandidate], &[ModelEffect]),
     ) -> Result<SummedProducts, MotionError> {
         let field = self.field(candidates, summed);
         let values = field.terms(chosen).fit(&field.total(), &[]).values;

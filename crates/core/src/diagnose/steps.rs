@@ -214,9 +214,12 @@ impl EffectJudge<'_> {
         at: usize,
     ) -> StepResult<FittedEffect> {
         let effect = estimates.effect(&self.field, &chosen[at], at);
+        let verified = estimates.verified(&self.field, chosen, at, self.noisier.as_deref())?;
+        let judged = verified.amplitude.over_covariance;
+        let covariance = estimates.covariance_of(&effect, at);
         Ok(FittedEffect {
-            verified: estimates.verified(&self.field, chosen, at, self.noisier.as_deref())?,
-            covariance: estimates.covariance_of(&effect, at),
+            verified,
+            covariance: covariance.iter().map(|x| judged * x).collect(),
             effect,
         })
     }

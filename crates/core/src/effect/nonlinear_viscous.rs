@@ -49,7 +49,10 @@ pub static LAW: Law = Law {
     limits: |_, _, shape| {
         vec![match shape[0] < 1.0 {
             true => ShapeSpan::of(0.3, 1.0 - BESIDE_VISCOUS).open_above(),
-            false => ShapeSpan::of(1.0 + BESIDE_VISCOUS, 3.0).open_below(),
+            // churning at speed takes the square
+            false => ShapeSpan::of(1.0 + BESIDE_VISCOUS, 3.0)
+                .open_below()
+                .by_physics(2.0),
         }]
     },
     code: Some(|to| {

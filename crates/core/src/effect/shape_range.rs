@@ -9,6 +9,8 @@ pub struct ShapeSpan {
     /// that these data do not tell from what lies beyond, and the effect stands. Elsewhere a shape at its end is no
     /// finding: what the data show is the law that begins there, or nothing.
     pub open: [bool; 2],
+    /// The value that physics gives it: it is held there where these data would have it at an end.
+    pub physics: Option<f64>,
 }
 
 impl ShapeSpan {
@@ -18,6 +20,7 @@ impl ShapeSpan {
             least,
             most,
             open: [false; 2],
+            physics: None,
         }
     }
 
@@ -37,6 +40,14 @@ impl ShapeSpan {
         }
     }
 
+    /// The range of a shape that physics gives this value.
+    pub const fn by_physics(self, value: f64) -> Self {
+        Self {
+            physics: Some(value),
+            ..self
+        }
+    }
+
     /// The range within other limits; where these are narrower, the end is theirs, and another law's.
     pub fn within(self, least: f64, most: f64) -> Self {
         Self {
@@ -46,6 +57,7 @@ impl ShapeSpan {
                 self.open[0] && self.least >= least,
                 self.open[1] && self.most <= most,
             ],
+            physics: self.physics.filter(|x| (least..=most).contains(x)),
         }
     }
 

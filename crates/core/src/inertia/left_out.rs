@@ -3,14 +3,35 @@
 use nalgebra::DVector;
 
 use super::accumulate::{self, BlockFactor, BlockFactors};
+use super::columns::JointTerm;
 use super::feasible::{ConsistencyProblem, FeasibleParameters, feasible};
 use super::solution::{FitError, joints, solve, stacked};
 use crate::judge::{NUMBERS, compare};
 
-/// Blocks that are left out one after the other.
-const BLOCKS: usize = 10;
-/// Fewest blocks whose scatter says something.
-const FEWEST: usize = 4;
+/// The numbers that decide between the two fits.
+struct LeftOutNumbers {
+    /// Blocks of neighbours in time that are left out one after the other. Half: one block decides; twice: twice the time.
+    in_time: usize,
+    /// Fewest blocks whose scatter says something. Half: two blocks judge; twice: logs of half a minute are not judged.
+    fewest: usize,
+    /// Blocks of like speed, of which the faster third is predicted by a fit to the slower ones. Half: four squares give a
+    /// scatter; twice: a block holds a second of a short log.
+    by_speed: usize,
+    /// Errors of the difference by which the plain fit must not be worse on the faster ones. None: chance takes it; twice:
+    /// a fit that misses faster motions by half is in use.
+    faster: f64,
+    /// Part of a joint's torque from which on a fit that leaves it is no model of the joint. Half: a joint of rough friction
+    /// counts; twice: none does.
+    no_model: f64,
+}
+
+const LEFT_OUT: LeftOutNumbers = LeftOutNumbers {
+    in_time: 10,
+    fewest: 4,
+    by_speed: 24,
+    faster: 1.0,
+    no_model: 0.5,
+};
 
 /// What both leave of a joint's torque on blocks left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +39,7 @@ pub struct TrialLeftOut {
     /// Residual over torque, fractions.
     pub plain: f64,
     pub consistent: f64,
-    /// Whether the consistent fit leaves more by more than chance.
+    /// Whether the consistent fit leaves more by more than chance, and by what one would notice.
     pub costs: bool,
 }
 
@@ -28,27 +49,91 @@ pub struct FitsOnLeftOut {
     pub joints: Vec<TrialLeftOut>,
     /// Whether the plain fit leaves less of all joints, each in units of its noise, by more than chance.
     pub plain_wins: bool,
-    /// The same where whole logs are left out, each of another motion; none of a single log.
-    pub plain_wins_on_other_logs: Option<bool>,
+    /// Whether it leaves more of the fastest third of the blocks where both are fitted to the others; none where these
+    /// do not determine them.
+    pub plain_loses_faster: Option<bool>,
 }
 
 impl FitsOnLeftOut {
-    /// Whether the plain fit is the better one on blocks left out and on other logs too.
+    /// Whether the plain fit is the better one: on blocks left out and not worse on faster ones, or of a joint that the
+    /// consistent one is no model of.
     pub fn plain_is_better(&self) -> bool {
-        self.plain_wins && self.plain_wins_on_other_logs == Some(true)
+        self.plain_wins && self.plain_loses_faster == Some(false)
+            || self.joints.iter().any(TrialLeftOut::is_no_model)
     }
 }
 
+impl TrialLeftOut {
+    /// Whether the consistent fit leaves most of the joint's torque where the plain one does not.
+    fn is_no_model(&self) -> bool {
+        self.consistent > LEFT_OUT.no_model && self.plain < LEFT_OUT.no_model
+    }
+}
+
+/// The rows of a fit in parts that can be left out.
+#[derive(Debug, Clone, Default)]
+pub struct FitParts {
+    /// Each of neighbouring blocks of one log.
+    pub in_time: Vec<BlockFactor>,
+    /// Each of blocks of like speed, the slowest first.
+    pub by_speed: Vec<BlockFactor>,
+}
+
 impl BlockFactors {
-    /// The same rows in about [`BLOCKS`] parts, each of neighbouring blocks of one log.
-    pub fn in_parts(&self) -> Vec<BlockFactor> {
+    /// The same rows in parts that can be left out.
+    pub fn in_parts(&self) -> FitParts {
         let logs = self.blocks.last().map_or(1, |block| block.log + 1);
-        let rows: u64 = self.blocks.iter().map(|block| block.rows).sum();
-        let each = (rows / BLOCKS.max(logs) as u64).max(1);
+        let in_time: Vec<&BlockFactor> = self.blocks.iter().collect();
+        let mut by_speed: Vec<(f64, &BlockFactor)> =
+            self.speeds().into_iter().zip(&self.blocks).collect();
+        by_speed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let by_speed: Vec<&BlockFactor> = by_speed.into_iter().map(|(_, block)| block).collect();
+        let one_log = |a: &BlockFactor, b: &BlockFactor| a.log == b.log;
+        FitParts {
+            in_time: self.joined(&in_time, LEFT_OUT.in_time.max(logs), &one_log),
+            by_speed: self.joined(&by_speed, LEFT_OUT.by_speed, &|_, _| true),
+        }
+    }
+
+    /// Speed of each block: the mean over the joints of its root mean square over that of the joint's fastest block.
+    fn speeds(&self) -> Vec<f64> {
+        let viscous = |j: usize| {
+            let own = self.columns.own[j].iter();
+            let mut own = own.enumerate().filter(|(_, t)| **t == JointTerm::Viscous);
+            let own = own.next().map(|(k, _)| self.columns.shared + k);
+            // the first of a known law is its viscous part
+            let known = || {
+                self.columns.known[j]
+                    .as_ref()
+                    .map(|_| self.columns.unknowns_of(j))
+            };
+            own.or_else(known)
+        };
+        let mut speeds = vec![0.0; self.blocks.len()];
+        for (j, column) in (0..self.columns.joints).filter_map(|j| Some((j, viscous(j)?))) {
+            let of_block = |b: &BlockFactor| b.r[j].column(column).norm() / (b.rows as f64).sqrt();
+            let each: Vec<f64> = self.blocks.iter().map(of_block).collect();
+            let fastest = each.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+            for (speed, own) in speeds.iter_mut().zip(each) {
+                *speed += own / fastest;
+            }
+        }
+        speeds
+    }
+
+    /// Blocks in about so many parts of neighbours that may be joined.
+    fn joined(
+        &self,
+        blocks: &[&BlockFactor],
+        count: usize,
+        may_join: &dyn Fn(&BlockFactor, &BlockFactor) -> bool,
+    ) -> Vec<BlockFactor> {
+        let rows: u64 = blocks.iter().map(|block| block.rows).sum();
+        let each = (rows / count as u64).max(1);
         let mut parts: Vec<Vec<&BlockFactor>> = Vec::new();
-        for block in &self.blocks {
+        for &block in blocks {
             let open = parts.last_mut().filter(|part| {
-                part[0].log == block.log && part.iter().map(|b| b.rows).sum::<u64>() < each
+                may_join(part[0], block) && part.iter().map(|b| b.rows).sum::<u64>() < each
             });
             match open {
                 Some(part) => part.push(block),
@@ -72,18 +157,15 @@ impl BlockFactors {
     }
 }
 
-/// Both fits by the blocks that `keep` names; nothing where those determine none.
+/// Both fits by the blocks that are kept; nothing where those determine none.
 fn both(
     factors: &BlockFactors,
-    parts: &[BlockFactor],
-    keep: &dyn Fn(&BlockFactor, usize) -> bool,
+    kept: Vec<BlockFactor>,
     weights: &[f64],
     task: &ConsistencyProblem,
 ) -> Result<[DVector<f64>; 2], FitError> {
-    let blocks = parts.iter().enumerate();
-    let blocks = blocks.filter(|(k, part)| keep(part, *k));
     let kept = BlockFactors {
-        blocks: blocks.map(|(_, part)| part.clone()).collect(),
+        blocks: kept,
         ..factors.without_blocks()
     };
     let joints = joints(&kept)?;
@@ -106,43 +188,45 @@ fn both(
 /// [`FitError`].
 pub fn left_out(
     factors: &BlockFactors,
-    parts: &[BlockFactor],
+    parts: &FitParts,
     weights: &[f64],
     task: &ConsistencyProblem,
 ) -> Result<Option<FitsOnLeftOut>, FitError> {
-    if parts.len() < FEWEST {
+    let FitParts { in_time, by_speed } = parts;
+    if in_time.len() < LEFT_OUT.fewest {
         return Ok(None);
     }
-    // squares by both fits, [fit][part][joint]
-    let tried = |by_log: bool| -> Result<[Vec<Vec<f64>>; 2], FitError> {
-        let mut squares = [Vec::new(), Vec::new()];
-        let mut of_log: Option<(usize, [DVector<f64>; 2])> = None;
-        for (k, part) in parts.iter().enumerate() {
-            let fits = match of_log.take().filter(|(log, _)| by_log && *log == part.log) {
-                Some((_, fits)) => fits,
-                None => {
-                    let keep = |other: &BlockFactor, at: usize| match by_log {
-                        true => other.log != part.log,
-                        false => at != k,
-                    };
-                    both(factors, parts, &keep, weights, task)?
-                }
-            };
-            for (squares, theta) in squares.iter_mut().zip(&fits) {
-                let square = |j: usize| {
-                    let own = factors.own_unknowns(theta, j);
-                    factors.parts(&part.r[j], j).residual_square(&own)
-                };
-                squares.push((0..factors.columns.joints).map(square).collect());
-            }
-            of_log = Some((part.log, fits));
-        }
-        Ok(squares)
+    let joints = 0..factors.columns.joints;
+    let squares_in = |part: &BlockFactor, theta: &DVector<f64>| -> Vec<f64> {
+        let square = |j: usize| {
+            let own = factors.own_unknowns(theta, j);
+            factors.parts(&part.r[j], j).residual_square(&own)
+        };
+        joints.clone().map(square).collect()
     };
     let inverse: Vec<f64> = weights.iter().map(|w| w * w).collect();
     let gain = |[plain, consistent]: &[Vec<Vec<f64>>; 2]| compare(consistent, plain, &inverse);
-    let squares = tried(false)?;
+    // squares by both fits, [fit][part][joint]
+    let mut squares = [Vec::new(), Vec::new()];
+    for (k, part) in in_time.iter().enumerate() {
+        let others = in_time.iter().enumerate().filter(|(at, _)| *at != k);
+        let others = others.map(|(_, other)| other.clone()).collect();
+        let fits = both(factors, others, weights, task)?;
+        for (squares, theta) in squares.iter_mut().zip(&fits) {
+            squares.push(squares_in(part, theta));
+        }
+    }
     let of_blocks = gain(&squares);
+    let (slower, faster) = by_speed.split_at(by_speed.len() - by_speed.len() / 3);
+    // what slow motion alone does not determine is not tried
+    let by_slower = (faster.len() >= LEFT_OUT.fewest)
+        .then(|| both(factors, slower.to_vec(), weights, task).ok());
+    let loses = |fits: [DVector<f64>; 2]| {
+        let squares =
+            fits.map(|theta| faster.iter().map(|part| squares_in(part, &theta)).collect());
+        let gain = gain(&squares);
+        gain.value < -LEFT_OUT.faster * gain.se
+    };
     let of_joint = |j: usize| {
         let torque = factors.moving[j].torque_square.max(f64::MIN_POSITIVE);
         let left = |which: usize| squares[which].iter().map(|part| part[j]).sum::<f64>();
@@ -150,16 +234,13 @@ pub fn left_out(
         TrialLeftOut {
             plain: (left(0) / torque).sqrt(),
             consistent: (left(1) / torque).sqrt(),
-            costs: value > NUMBERS.screen * se,
+            costs: value > NUMBERS.screen * se
+                && left(1).sqrt() > (1.0 + NUMBERS.noticeable) * left(0).sqrt(),
         }
     };
-    let several = parts.iter().any(|part| part.log != parts[0].log);
-    // what one log alone does not determine is not tried
-    let others = several.then(|| tried(true).ok()).flatten();
-    let beyond = |squares: &[Vec<Vec<f64>>; 2]| gain(squares).is_beyond(NUMBERS.screen, None);
     Ok(Some(FitsOnLeftOut {
-        joints: (0..factors.columns.joints).map(of_joint).collect(),
-        plain_wins: beyond(&squares),
-        plain_wins_on_other_logs: others.as_ref().map(beyond),
+        joints: joints.clone().map(of_joint).collect(),
+        plain_wins: of_blocks.is_beyond(NUMBERS.screen, None),
+        plain_loses_faster: by_slower.flatten().map(loses),
     }))
 }

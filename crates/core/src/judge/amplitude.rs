@@ -50,6 +50,8 @@ pub struct EffectAmplitude {
     pub torque: [f64; 2],
     /// Factor of its amplitude in predictions, 0..1.
     pub s: f64,
+    /// The variance that judged over that which [`JointFit::covariance`] gives its torque.
+    pub over_covariance: f64,
 }
 
 impl EffectAmplitude {
@@ -148,6 +150,7 @@ impl JointFit {
             blocks: 0.0,
             torque: [0.0; 2],
             s: 0.0,
+            over_covariance: 1.0,
         };
         let joints = 0..self.total.len();
         let of_joint: Vec<DMatrix<f64>> = joints
@@ -161,7 +164,6 @@ impl JointFit {
             |x: &DVector<f64>| x.select_rows(&free) + &by_shape * x.select_rows(&effect.slopes);
         let amplitude = along(&self.values);
         let without: Vec<DVector<f64>> = self.without.iter().map(along).collect();
-        let mut spread = jackknife(&amplitude, &without);
         let places: Vec<usize> = free.iter().chain(&effect.slopes).copied().collect();
         let known = self.known.select_rows(&places).select_columns(&places);
         let k = free.len();
@@ -169,7 +171,6 @@ impl JointFit {
         map.view_mut((0, 0), (k, k)).fill_with_identity();
         map.view_mut((0, k), (k, effect.slopes.len()))
             .copy_from(&by_shape);
-        spread += &map * known * map.transpose();
         let pull = &beside * &amplitude;
         let size = amplitude.dot(&pull);
         if k == 0 || size.is_nan() || size <= 0.0 {
@@ -180,10 +181,21 @@ impl JointFit {
         });
         // noise must not make an effect; a number that can be measured must not be hidden by it either
         let part = if measured { part } else { part.max(0.0) };
-        spread.ger(part * part, &amplitude, &amplitude, 1.0);
-        for i in 0..k {
-            spread[(i, i)] += EXACT * amplitude[i] * amplitude[i] + f64::MIN_POSITIVE;
-        }
+        let along_pull = map.tr_mul(&pull);
+        let known = along_pull.dot(&(known * &along_pull)) / (size * size) + EXACT;
+        let not_chance = known + part * part;
+        let changes: Vec<f64> = without.iter().map(|x| x.dot(&pull) / size - 1.0).collect();
+        let readings = ChanceReading::both(&changes, &self.leverages(&free, &amplitude), numbers);
+        let surest = readings.into_iter().filter_map(|reading| {
+            let f = 1.0 / ((reading.variance + not_chance) * k as f64);
+            let floor = floor(k, reading.blocks, numbers).map(|floor| floor / reading.wide)?;
+            Some((f, floor, reading))
+        });
+        let surest = surest.max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+        let variance = not_chance
+            + surest
+                .as_ref()
+                .map_or(f64::INFINITY, |(_, _, r)| r.variance);
         let strongest = joints.clone().max_by(|a, b| {
             let square =
                 |j: usize| self.terms.weights[j] * amplitude.dot(&(&of_joint[j] * &amplitude));
@@ -192,21 +204,13 @@ impl JointFit {
         if let Some(j) = strongest {
             let square = amplitude.dot(&(&of_joint[j] * &amplitude));
             let rms = (square / self.rows[j].max(1.0)).sqrt();
-            out.torque = [
-                rms,
-                rms * pull.dot(&(&spread * &pull)).max(0.0).sqrt() / size,
-            ];
+            out.torque = [rms, rms * variance.sqrt()];
         }
-        let leverages = self.leverages(&free, &amplitude);
-        if let Some((blocks, wide)) = freedom(&leverages) {
-            out.blocks = blocks;
-            out.floor = floor(k, blocks, numbers).map(|floor| floor / wide);
+        if let Some((f, floor, reading)) = surest {
+            out.over_covariance = (reading.variance + not_chance) / (reading.scatter + known);
+            (out.f, out.blocks) = (f, reading.blocks);
+            out.floor = (self.blocks.len() >= numbers.least_blocks).then_some(floor);
         }
-        if self.blocks.len() < numbers.least_blocks {
-            out.floor = None;
-        }
-        let across = pull.dot(&(&spread * &pull)).max(f64::MIN_POSITIVE);
-        out.f = size * size / (across * k as f64);
         out.s = out
             .floor
             .map_or(0.0, |floor| (1.0 - floor / out.f).max(0.0));
@@ -363,6 +367,49 @@ impl JointFit {
     }
 }
 
+/// Chance in an amplitude, as a part of it, and how sure that is.
+struct ChanceReading {
+    /// Square of the relative deviation.
+    variance: f64,
+    /// The same by the scatter of fits without each block.
+    scatter: f64,
+    /// Number of blocks of equal information that would tell the variance as surely.
+    blocks: f64,
+    /// How much wider than the truth the variance comes out.
+    wide: f64,
+}
+
+impl ChanceReading {
+    /// By the scatter of fits without each block, whose relative `changes` these are; and moderated by the noise that
+    /// all blocks tell, which tells an effect of few blocks from chance (Smyth 2004).
+    fn both(changes: &[f64], leverages: &[f64], numbers: &Numbers) -> Vec<Self> {
+        let Some((blocks, wide)) = freedom(leverages) else {
+            return Vec::new();
+        };
+        let n = changes.len() as f64;
+        let scatter = changes.iter().map(|x| x * x).sum::<f64>() * (n - 1.0) / n;
+        let plain = ChanceReading {
+            variance: scatter,
+            scatter,
+            blocks,
+            wide,
+        };
+        // without a block of leverage h the fit moves by noise of the variance h / (1 - h) of its own
+        let telling = changes.iter().zip(leverages);
+        let telling = telling.filter(|(_, h)| **h * n > SILENT);
+        let count = telling.clone().count() as f64;
+        let alike = telling.map(|(x, h)| x * x * (1.0 - h) / h).sum::<f64>() / count.max(1.0);
+        let (shared, own) = (numbers.shared_noise, blocks - 1.0);
+        let moderated = ChanceReading {
+            scatter,
+            variance: (shared * alike + own * scatter / wide) / (shared + own),
+            blocks: (blocks + shared).min(n),
+            wide: 1.0,
+        };
+        vec![plain, moderated]
+    }
+}
+
 /// How many equal blocks would show as much scatter by chance as these, and how much wider than the truth the deviation
 /// comes out: the jackknife's variance of independent blocks with these leverages (Satterthwaite 1946; Bell and
 /// McCaffrey 2002).
@@ -396,15 +443,18 @@ fn firm(of: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
 const EXACT: f64 = 1e-12;
 /// Part of the mean information below which a block says nothing of an amplitude.
 const SILENT: f64 = 1e-3;
+/// Readings of chance of which the surer one judges.
+const READINGS: f64 = 2.0;
 /// Steps of halving by which the floor is found.
 const HALVINGS: usize = 60;
 
 /// The F of k numbers by n blocks that chance exceeds as rarely as [`Numbers::deviations`] of one number by
-/// [`Numbers::blocks`], for the combination of them that was found (Scheffé 1953); none of less than two blocks.
+/// [`Numbers::blocks`], for the combination of them that was found (Scheffé 1953), where two readings of chance are
+/// asked; none of less than two blocks.
 pub fn floor(k: usize, n: f64, numbers: &Numbers) -> Option<f64> {
     let chance = |k: f64, n: f64, f: f64| Some(FisherSnedecor::new(k, n).ok()?.sf(f));
     let usual = numbers.blocks as f64 - 1.0;
-    let rare = chance(1.0, usual, numbers.deviations.powi(2))?;
+    let rare = chance(1.0, usual, numbers.deviations.powi(2))? / READINGS;
     let k = k as f64;
     // blocks that are not there are not missed
     let n = n.min(numbers.blocks as f64);
@@ -433,8 +483,8 @@ mod tests {
         let near = |found: f64, wanted: f64| {
             assert!((found / wanted - 1.0).abs() < 0.04, "{found} {wanted}")
         };
-        near(of(1, 24.0), 25.0);
-        near(of(1, 12.0), 42.0);
+        near(of(1, 24.0), 28.6);
+        near(of(1, 12.0), 50.0);
         // each number beside the first makes the square of a torque that chance reaches greater, and F less
         let each: Vec<f64> = (1..=10).map(|k| of(k, 24.0)).collect();
         assert!(each.windows(2).all(|f| f[1] < f[0]), "{each:?}");

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::NUMBERS;
 use super::bounded::{self, Bound};
 use super::sums::{BlockSums, Term, Terms};
 use crate::math::cholesky::substitute;
@@ -29,16 +30,30 @@ pub fn compare(before: &[Vec<f64>], after: &[Vec<f64>], weights: &[f64]) -> Erro
         pairs.map(|((a, b), w)| w * (a - b)).collect()
     };
     let gains: Vec<Vec<f64>> = before.iter().zip(after).map(of_block).collect();
-    ErrorGain::of(&gains)
+    ErrorGain::of(&gains, None)
+}
+
+/// Change of the squared error of a joint's rows in a block, and the square of the change of torque that makes it.
+struct BlockChange {
+    error: f64,
+    torque: f64,
 }
 
 impl ErrorGain {
-    /// Of weighted gains `[block][joint]`.
-    pub(super) fn of(gains: &[Vec<f64>]) -> Self {
-        let blocks: Vec<f64> = gains.iter().map(|g| g.iter().sum()).collect();
+    /// Of weighted gains `[block][joint]`, and the weighted squares of the changes of torque that make them where these
+    /// are known: an effect that acts in few blocks gains in those, which is no chance.
+    pub(super) fn of(gains: &[Vec<f64>], torques: Option<&[Vec<f64>]>) -> Self {
+        let sums = |of: &[Vec<f64>]| -> Vec<f64> { of.iter().map(|g| g.iter().sum()).collect() };
+        let column = |of: &[Vec<f64>], j: usize| -> Vec<f64> { of.iter().map(|g| g[j]).collect() };
+        let with_error = |gains: &[f64], torques: Option<Vec<f64>>| {
+            let [sum, error] = sum_and_error(gains.iter().copied());
+            let about_line = torques.map(|q| NUMBERS.about_line * error_about_line(gains, &q));
+            [sum, about_line.map_or(error, |about| error.min(about))]
+        };
+        let blocks = sums(gains);
         let joints = gains.first().map_or(0, Vec::len);
-        let of_joint = |j: usize| sum_and_error(gains.iter().map(|g| g[j]));
-        let [value, se] = sum_and_error(blocks.iter().copied());
+        let of_joint = |j: usize| with_error(&column(gains, j), torques.map(|q| column(q, j)));
+        let [value, se] = with_error(&blocks, torques.map(sums));
         ErrorGain {
             value,
             se,
@@ -74,6 +89,24 @@ fn sum_and_error(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     let mean = sum / count.max(1.0);
     let scatter: f64 = values.map(|x| (x - mean) * (x - mean)).sum();
     [sum, (scatter / (count - 1.0).max(1.0) * count).sqrt()]
+}
+
+/// Standard error of a sum of gains, by their scatter about parts of it that are as the squares of the changes of torque
+/// in the blocks: the greater of the scatter itself and that of noise which is alike in all blocks.
+fn error_about_line(gains: &[f64], torques: &[f64]) -> f64 {
+    let (sum, all) = (gains.iter().sum::<f64>(), torques.iter().sum::<f64>());
+    if all <= 0.0 {
+        return f64::INFINITY;
+    }
+    let told = gains.iter().zip(torques).filter(|(_, q)| **q > 0.0);
+    let count = told.clone().count() as f64;
+    let squares = told.map(|(g, q)| ((g - sum * q / all).powi(2), q / all));
+    let (mut scatter, mut alike) = (0.0, 0.0);
+    for (square, part) in squares {
+        scatter += square / (1.0 - part).max(f64::EPSILON);
+        alike += square / part;
+    }
+    scatter.max(alike / count).sqrt()
 }
 
 /// The fit of the terms in use without one block.
@@ -180,6 +213,7 @@ impl<'a> BlocksLeftOut<'a> {
         let bounds: Vec<Bound> = more.iter().map(|t| t.bound).collect();
         let diagonal: Vec<f64> = all.own.diagonal().iter().copied().collect();
         let mut gains = Vec::with_capacity(self.without.len());
+        let mut torques = Vec::with_capacity(self.without.len());
         let mut others = all.clone();
         for (b, without) in self.without.iter().enumerate() {
             others.copy_from(&all);
@@ -194,14 +228,17 @@ impl<'a> BlocksLeftOut<'a> {
             let moved = &beyond.through * -&amplitude;
             let values = &without.values + &moved;
             let added = if there(b) { more } else { &[] };
-            let gain = |j: usize| -> f64 {
-                let moves = (without, &moved, &values);
-                let change = self.change((b, j), added, moves, &amplitude);
-                -self.terms.weights[j] * change
+            let moves = (without, &moved, &values);
+            let changes = (0..joints).map(|j| self.change((b, j), added, moves, &amplitude));
+            let changes: Vec<BlockChange> = changes.collect();
+            let weighted = |of: &dyn Fn(&BlockChange) -> f64| -> Vec<f64> {
+                let pairs = changes.iter().zip(&self.terms.weights);
+                pairs.map(|(change, w)| w * of(change)).collect()
             };
-            gains.push((0..joints).map(gain).collect());
+            gains.push(weighted(&|change| -change.error));
+            torques.push(weighted(&|change| change.torque));
         }
-        ErrorGain::of(&gains)
+        ErrorGain::of(&gains, Some(&torques))
     }
 
     /// Change of a joint's squared error in a block by more terms, for which those in use have moved to `values`.
@@ -211,11 +248,12 @@ impl<'a> BlocksLeftOut<'a> {
         more: &[Term],
         (without, moved, values): (&Without, &DVector<f64>, &DVector<f64>),
         amplitude: &DVector<f64>,
-    ) -> f64 {
+    ) -> BlockChange {
         let own = &self.own[j];
         let step: Vec<f64> = own.iter().map(|(i, _)| moved[*i]).collect();
         let pulled = step.iter().zip(without.pull[j].iter()).map(|(x, p)| x * p);
-        let mut change = quadratic_form(&without.products[j], &step) - 2.0 * pulled.sum::<f64>();
+        let mut torque = quadratic_form(&without.products[j], &step);
+        let mut error = torque - 2.0 * pulled.sum::<f64>();
         let block = &self.sums.blocks[b][j];
         let tau = block.nrows() - 1;
         let added = more.iter().zip(amplitude.iter());
@@ -226,9 +264,14 @@ impl<'a> BlocksLeftOut<'a> {
             let column = block.column(c);
             let used: f64 = own.iter().map(|&(i, a)| column[a] * values[i]).sum();
             let among: f64 = added.iter().map(|&(d, y)| column[d] * y).sum();
-            change += x * (among + 2.0 * used - 2.0 * column[tau]);
+            let moves: f64 = own.iter().map(|&(i, a)| column[a] * moved[i]).sum();
+            error += x * (among + 2.0 * used - 2.0 * column[tau]);
+            torque += x * (among + 2.0 * moves);
         }
-        change
+        BlockChange {
+            error,
+            torque: torque.max(0.0),
+        }
     }
 
     /// Fits the terms in use to all fitted blocks; none where these determine nothing.

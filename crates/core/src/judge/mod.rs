@@ -50,6 +50,12 @@ pub struct Numbers {
     /// hundred. Half: of measured logs half as many joints again get worse, one of them by a fifth; five: a twelfth of
     /// the gain is lost.
     pub expected_deviations: f64,
+    /// Degrees of freedom of the noise that all blocks tell, beside those of an effect's own blocks. Half: an effect of
+    /// two blocks stays chance; twice: where its blocks are nine times noisier, one in a hundred of chance's is written.
+    pub shared_noise: f64,
+    /// The error of a gain by its scatter about what the change of torque in each block lets expect counts so many times.
+    /// Half: what one block holds passes; twice: an effect of few blocks is not seen.
+    pub about_line: f64,
     /// A block is at least so many 1/e times of the residual long. Half: neighbours share their noise; five: the logs
     /// of a robot that lacks an effect give a handful of blocks.
     pub memory_times: f64,
@@ -90,6 +96,8 @@ pub const NUMBERS: Numbers = Numbers {
     least_blocks: 8,
     deviations: 5.0,
     expected_deviations: 3.0,
+    shared_noise: 4.0,
+    about_line: 2.0,
     memory_times: 1.0,
     noticeable: 0.02,
     noticeable_torque: 1e-3,

@@ -1,8 +1,8 @@
 //! The plain fit and the physically consistent one on rows that neither has seen.
 
-use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
+use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::feasible::ConsistencyProblem;
-use cft_ident_core::inertia::left_out::{FitsOnLeftOut, left_out};
+use cft_ident_core::inertia::left_out::{FitParts, FitsOnLeftOut, TrialLeftOut, left_out};
 use cft_ident_core::inertia::solve::{RowWeighting, factor, fit, weights_of};
 use nalgebra::{DMatrix, DVector};
 
@@ -23,7 +23,7 @@ fn weights(factors: &BlockFactors) -> Vec<f64> {
 }
 
 /// Both fits on some of these parts left out, nothing known of bodies.
-fn tried_on(factors: &BlockFactors, parts: &[BlockFactor]) -> Option<FitsOnLeftOut> {
+fn tried_on(factors: &BlockFactors, parts: &FitParts) -> Option<FitsOnLeftOut> {
     let weights = weights(factors);
     let whole = factor(factors, &weights).expect("rows");
     let map = robot().standard_map();
@@ -43,7 +43,7 @@ fn tried(factors: &BlockFactors) -> FitsOnLeftOut {
 
 /// Squared residual of each joint's rows of a part, by weighted least squares of all other parts from scratch.
 fn from_scratch(factors: &BlockFactors) -> [f64; 2] {
-    let (parts, weights) = (factors.in_parts(), weights(factors));
+    let (parts, weights) = (factors.in_parts().in_time, weights(factors));
     let columns = &factors.columns;
     let u = columns.unknowns();
     let mut out = [0.0; 2];
@@ -87,11 +87,11 @@ fn parts_left_out_are_judged_by_fits_that_never_saw_them() {
         assert!(!found.joints[j].costs);
     }
     assert!(!found.plain_wins && !found.plain_is_better());
-    assert!(found.plain_wins_on_other_logs.is_some());
+    assert!(found.plain_loses_faster.is_some());
 }
 
 #[test]
-fn torques_that_no_bodies_make_are_better_explained_without_them_on_other_logs_too() {
+fn torques_that_no_bodies_make_are_better_explained_without_them_on_faster_blocks_too() {
     let mut none = bodies();
     // a moment of inertia of the last link that is below nothing
     none[15] = -0.5;
@@ -103,17 +103,34 @@ fn torques_that_no_bodies_make_are_better_explained_without_them_on_other_logs_t
             .iter()
             .any(|j| j.costs && j.consistent > 1.1 * j.plain)
     );
-    // of one log there is no other
+    assert_eq!(found.plain_loses_faster, Some(false));
     let alone = tried(&rows(&none, &waves(1.0), [1.0; 2], NOISE));
-    assert_eq!(
-        (alone.plain_wins, alone.plain_wins_on_other_logs),
-        (true, None)
-    );
-    assert!(!alone.plain_is_better());
+    assert!(alone.plain_is_better());
+}
+
+#[test]
+fn a_plain_fit_that_loses_faster_motion_is_not_taken_and_one_beside_no_model_is() {
+    let joint = |plain: f64, consistent: f64| TrialLeftOut {
+        plain,
+        consistent,
+        costs: true,
+    };
+    let of = |joint: TrialLeftOut, plain_loses_faster: Option<bool>| FitsOnLeftOut {
+        joints: vec![joint],
+        plain_wins: true,
+        plain_loses_faster,
+    };
+    let taken = [Some(false), Some(true), None].map(|f| of(joint(0.02, 0.03), f).plain_is_better());
+    assert_eq!(taken, [true, false, false]);
+    // what leaves more than the joint's torque is no model of it, whatever faster motion says
+    assert!(of(joint(0.18, 1.23), Some(true)).plain_is_better());
+    assert!(!of(joint(0.82, 1.23), Some(true)).plain_is_better());
 }
 
 #[test]
 fn too_few_parts_are_not_tried() {
     let factors = two_logs(&bodies());
-    assert!(tried_on(&factors, &factors.in_parts()[..3]).is_none());
+    let mut parts = factors.in_parts();
+    parts.in_time.truncate(3);
+    assert!(tried_on(&factors, &parts).is_none());
 }

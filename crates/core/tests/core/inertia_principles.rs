@@ -118,7 +118,7 @@ fn a_log_that_is_condensed_gives_the_same_fit_and_nearly_the_same_deviations() {
         near(found.covariance[(i, i)], plain.covariance[(i, i)], 0.3);
     }
     // parts hold every row once
-    let parts = whole.in_parts();
+    let parts = whole.in_parts().in_time;
     assert!((9..=11).contains(&parts.len()), "{}", parts.len());
     assert_eq!(parts.iter().map(|p| p.rows).sum::<u64>(), ROWS as u64);
     let gram = |r: &DMatrix<f64>| r.tr_mul(r);

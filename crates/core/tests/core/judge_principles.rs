@@ -59,8 +59,8 @@ fn more() -> Vec<Term> {
     vec![term(&[(0, 2)]), term(&[(1, 2), (0, 3)])]
 }
 
-/// Least squares of the rows of some blocks, from scratch; and what they leave of a block, joint by joint.
-fn solved(terms: &Terms, keep: impl Fn(usize) -> bool) -> DVector<f64> {
+/// Columns and torques of the rows of some blocks, weighted; rows of the others are zero.
+fn weighted_rows(terms: &Terms, keep: impl Fn(usize) -> bool) -> (DMatrix<f64>, DVector<f64>) {
     let u = terms.list.len();
     let count = 2 * BLOCKS * ROWS;
     let (mut x, mut y) = (DMatrix::zeros(count, u), DVector::zeros(count));
@@ -78,9 +78,28 @@ fn solved(terms: &Terms, keep: impl Fn(usize) -> bool) -> DVector<f64> {
             }
         }
     }
+    (x, y)
+}
+
+/// Least squares of the rows of some blocks, from scratch; and what they leave of a block, joint by joint.
+fn solved(terms: &Terms, keep: impl Fn(usize) -> bool) -> DVector<f64> {
+    let (x, y) = weighted_rows(terms, keep);
     x.svd(true, true)
         .solve(&y, 1e-12)
         .expect("both sides were asked for")
+}
+
+/// Part of the information on the last term beside the others that each block holds.
+fn leverages(terms: &Terms) -> Vec<f64> {
+    let (x, _) = weighted_rows(terms, |_| true);
+    let last = x.ncols() - 1;
+    let (others, own) = (x.columns(0, last).into_owned(), x.column(last).into_owned());
+    let explained = others.clone().svd(true, true).solve(&own, 1e-12);
+    let beside = &own - &others * explained.expect("both sides were asked for");
+    let of_block = |b: usize| beside.rows(2 * b * ROWS, 2 * ROWS).norm_squared();
+    (0..BLOCKS)
+        .map(|b| of_block(b) / beside.norm_squared())
+        .collect()
 }
 
 fn left(terms: &Terms, values: &DVector<f64>, b: usize, j: usize) -> f64 {
@@ -156,23 +175,35 @@ fn a_gain_is_the_fall_of_the_errors_where_all_is_fitted_anew() {
     let after = BlocksLeftOut::new(&sums, 0, &with).expect("rows").errors();
     let expected = compare(&left_out.errors(), &after, &WEIGHTS);
     near(gain.value, expected.value, 1e-8);
-    near(gain.se, expected.se, 1e-7);
-    for (a, b) in gain
-        .joints
-        .iter()
-        .flatten()
-        .zip(expected.joints.iter().flatten())
-    {
-        near(*a, *b, 1e-7);
+    for (a, b) in gain.joints.iter().zip(&expected.joints) {
+        near(a[0], b[0], 1e-7);
+        assert!(a[1] <= b[1] * (1.0 + 1e-7));
     }
     for (a, b) in gain.blocks.iter().zip(&expected.blocks) {
         near(*a, *b, 1e-7);
     }
-    // by the scatter of the blocks
+    // by the scatter of the blocks, or by twice that about parts as the squares of the changes of torque are
     let n = BLOCKS as f64;
     let mean = gain.value / n;
     let square: f64 = gain.blocks.iter().map(|x| (x - mean).powi(2)).sum();
-    near(gain.se, (n * square / (n - 1.0)).sqrt(), 1e-9);
+    let scatter = (n * square / (n - 1.0)).sqrt();
+    let torques: Vec<f64> = (0..BLOCKS)
+        .map(|b| {
+            let values = |terms: &Terms| solved(terms, |other| other != b);
+            let (x, _) = weighted_rows(&with, |other| other == b);
+            let mut moved = values(&with);
+            let before = values(&terms);
+            (0..before.len()).for_each(|i| moved[i] -= before[i]);
+            (x * moved).norm_squared()
+        })
+        .collect();
+    let all: f64 = torques.iter().sum();
+    let off = |b: usize| (gain.blocks[b] - gain.value * torques[b] / all).powi(2);
+    let about = (0..BLOCKS)
+        .map(|b| off(b) / (1.0 - torques[b] / all))
+        .sum::<f64>();
+    let alike = (0..BLOCKS).map(|b| off(b) * all / torques[b]).sum::<f64>() / n;
+    near(gain.se, scatter.min(2.0 * about.max(alike).sqrt()), 1e-6);
     let ratio = gain.value / gain.se;
     assert!(gain.is_beyond(0.99 * ratio, None) && !gain.is_beyond(1.01 * ratio, None));
     let own = gain.joints[0][0] / gain.joints[0][1];
@@ -252,9 +283,36 @@ fn an_amplitude_and_its_deviation_are_those_of_the_fits_without_each_block() {
     };
     let found = fit.amplitude(&alone, (None, false), &NUMBERS);
     near(found.values[0], expected[3], 1e-9);
-    let ratio = expected[3] / scatter[(3, 3)].sqrt();
-    near(found.f, ratio * ratio, 1e-4);
-    near(found.torque[1] / found.torque[0], 1.0 / ratio.abs(), 1e-4);
+    let mut order = terms.clone();
+    order.list.swap(3, 4);
+    let h = leverages(&order);
+    let square = |b: usize, c: usize| match b == c {
+        true => (h[b] / (1.0 - h[b])).powi(2),
+        false => (h[b] * h[c] / ((1.0 - h[b]) * (1.0 - h[c]))).powi(2),
+    };
+    let mean: f64 = h.iter().map(|h| h / (1.0 - h)).sum();
+    let pairs = (0..BLOCKS).flat_map(|b| (0..BLOCKS).map(move |c| (b, c)));
+    let blocks = 1.0 + mean * mean / pairs.map(|(b, c)| square(b, c)).sum::<f64>();
+    let change = |b: usize| solved(&terms, |other| other != b)[3] / expected[3] - 1.0;
+    let alike = (0..BLOCKS).map(|b| change(b).powi(2) * (1.0 - h[b]) / h[b]);
+    let alike = alike.sum::<f64>() / n;
+    let plain = scatter[(3, 3)] / expected[3].powi(2);
+    let wide = mean * (n - 1.0) / n;
+    let moderated = (4.0 * alike + (blocks - 1.0) * plain / wide) / (blocks + 3.0);
+    let floor_of = |blocks: f64| floor(1, blocks, &NUMBERS).expect("blocks enough");
+    let certainties = [
+        wide / (plain * floor_of(blocks)),
+        1.0 / (moderated * floor_of((blocks + 4.0).min(n))),
+    ];
+    let judging = if certainties[0] > certainties[1] {
+        plain
+    } else {
+        moderated
+    };
+    near(found.certainty(), certainties[0].max(certainties[1]), 1e-4);
+    near(found.f, 1.0 / judging, 1e-4);
+    near(found.over_covariance, judging / plain, 1e-4);
+    near(found.torque[1] / found.torque[0], judging.sqrt(), 1e-4);
     let square: f64 = (0..BLOCKS)
         .map(|b| rows(b, 0).column(2).norm_squared())
         .sum();
@@ -325,12 +383,14 @@ fn what_is_known_beforehand_pulls_as_firmly_as_it_is_known() {
 
 #[test]
 fn the_floor_of_f_is_as_rare_as_so_many_deviations_of_one_number() {
+    // two readings of chance are asked, each half as often wrong
+    let t = StudentsT::new(0.0, 1.0, 23.0).expect("degrees above 0");
+    let rare = t.sf(NUMBERS.deviations);
     // of one number F is the square of Student's t
     for blocks in [24.0, 60.0] {
-        near(floor(1, blocks, &NUMBERS).expect("blocks"), 25.0, 1e-6);
+        let found = floor(1, blocks, &NUMBERS).expect("blocks");
+        near(2.0 * t.sf(found.sqrt()), rare, 1e-6);
     }
-    let t = StudentsT::new(0.0, 1.0, 23.0).expect("degrees above 0");
-    let rare = 2.0 * t.sf(NUMBERS.deviations);
     for (k, blocks) in [(1, 12.0), (2, 9.5), (3, 24.0), (6, 16.0)] {
         let found = floor(k, blocks, &NUMBERS).expect("blocks");
         let f = FisherSnedecor::new(k as f64, blocks - 1.0).expect("degrees above 0");

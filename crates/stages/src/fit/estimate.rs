@@ -9,7 +9,7 @@ use super::known_friction::{of_joint, of_refinement, with_friction};
 use crate::input::error::IdentifyError;
 use crate::input::lsq_rows::{LsqRows, PositionReading};
 use crate::input::robot_setup::RobotSetup;
-use cft_ident_core::inertia::accumulate::{BlockFactor, BlockFactors};
+use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::add_processing;
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::departure;
@@ -18,6 +18,7 @@ use cft_ident_core::inertia::feasible::nearest;
 use cft_ident_core::inertia::instruments::{self, InstrumentalFit};
 use cft_ident_core::inertia::late;
 use cft_ident_core::inertia::law_start;
+use cft_ident_core::inertia::left_out::FitParts;
 use cft_ident_core::inertia::refine::{self, RefinedFit};
 use cft_ident_core::inertia::robust::{self, RobustFit, RowWeigher};
 use cft_ident_core::inertia::solution::FitError;
@@ -108,7 +109,7 @@ pub struct InertialEstimate {
 pub struct FitRows {
     pub sums: BlockFactors,
     /// The same in parts that can be left out; none where the fit is not linear in its rows.
-    pub parts: Vec<BlockFactor>,
+    pub parts: FitParts,
     /// What their solution lacks to the fit's parameters: a law that they are linear about.
     pub shift: DVector<f64>,
 }
@@ -118,7 +119,7 @@ impl FitRows {
     fn in_one_block(sums: &BlockFactors, unknowns: usize) -> Self {
         FitRows {
             sums: sums.in_one_block(),
-            parts: Vec::new(),
+            parts: FitParts::default(),
             shift: DVector::zeros(unknowns),
         }
     }

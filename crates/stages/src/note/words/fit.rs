@@ -180,7 +180,7 @@ impl Display for FitNote {
                         "the model computes with the physically consistent parameters; --unconstrained writes the plain fit alone"
                     }
                     false => {
-                        "the model computes with the plain fit, which is better on other logs too; files of links are exported from the physically consistent parameters"
+                        "the model computes with the plain fit, which is better on blocks of these logs and no worse on the fastest of them; files of links are exported from the physically consistent parameters"
                     }
                 };
                 write!(
