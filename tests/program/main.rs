@@ -28,6 +28,7 @@ mod export;
 mod export_effects;
 mod export_observer;
 mod export_support;
+mod few_blocks;
 mod friction_prior;
 mod from_log_to_use;
 mod gains;

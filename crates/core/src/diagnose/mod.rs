@@ -33,8 +33,8 @@ mod watch;
 
 pub use error::DiagnoseError;
 pub use outcome::{
-    Diagnosis, FormulaEnd, FormulaPicture, FormulaSymmetry, FoundEffect, FoundFormula,
-    FrictionChange, LeftCandidate, NotWritten, PredictingTerm, SplitErrors, StepStatus,
+    ChangedTorque, Diagnosis, FormulaEnd, FormulaPicture, FormulaSymmetry, FoundEffect,
+    FoundFormula, LeftCandidate, NotWritten, PredictingTerm, SplitErrors, StepStatus, TorqueChange,
 };
 pub use problem::case::{AcceptedEffect, DiagnosisCase, DiagnosisOptions};
 pub use problem::data_split::{LogRole, SetAside};

@@ -125,14 +125,25 @@ pub struct SplitErrors {
     pub holdout: Option<UseErrors>,
 }
 
-/// Change of a joint's friction from a time on.
+/// What of a joint's torque changes from a time on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChangedTorque {
+    /// Its friction.
+    Friction,
+    /// A constant torque: the zero of the channel.
+    Offset,
+}
+
+/// Change of a joint's torque from a time on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrictionChange {
+pub struct TorqueChange {
     pub joint: usize,
     pub log: usize,
     /// By the log's own clock \[s\].
     pub at_s: f64,
-    /// Change of the friction at the joint's rms speed [N or Nm].
+    pub of: ChangedTorque,
+    /// Change of the constant torque, or of the friction at the joint's rms speed [N or Nm].
     pub by: f64,
     /// Gain on blocks left out over its standard error.
     pub certainty: f64,
@@ -241,7 +252,7 @@ pub struct Diagnosis {
     /// The same of the declared model alone, where something was added to it.
     pub left_alone: Option<WhatIsLeft>,
     pub set_aside: Vec<SetAside>,
-    pub changes: Vec<FrictionChange>,
+    pub changes: Vec<TorqueChange>,
     /// Root mean square of the filtered residual per joint.
     pub residual_std: Vec<f64>,
     /// Logs that were fitted: the first ones.
@@ -260,7 +271,7 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Whether something is missing yet: more than a little is left above the noise, or friction changes over time.
+    /// Whether something is missing yet: more than a little is left above the noise, or a torque changes from a time on.
     pub fn incomplete(&self) -> bool {
         self.left
             .unexplained

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::accepted::refuse_failed;
-use super::change::friction_changes;
+use super::change::torque_changes;
 use super::error::DiagnoseError;
 use super::outcome::JudgedEffects;
 use super::outcome::{Diagnosis, FoundEffect, LeftCandidate, NotWritten, WhatIsLeft};
@@ -126,7 +126,10 @@ impl PreparedCase<'_> {
         Ok(Diagnosis {
             left,
             left_alone: added.then(|| self.what_is_left(alone)).transpose()?,
-            changes: friction_changes(self, searched),
+            changes: torque_changes(
+                &self.field(&searched.candidates, &searched.summed),
+                &searched.chosen,
+            ),
             candidates: left_candidates(searched, &judged.steps, &case.numbers),
             determined: searched.determined,
             model: judged.proposed,

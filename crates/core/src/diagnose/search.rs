@@ -7,7 +7,7 @@ use super::candidates::{EffectCandidate, exclude, is_friction_law};
 use super::error::DiagnoseError;
 use super::prepared::{PreparedCase, SummedProducts};
 use super::watch::DiagnosisWatch;
-use crate::effect::{EffectPlace, ModelEffect};
+use crate::effect::{EffectPlace, Family, ModelEffect};
 use crate::judge::{BlocksLeftOut, ErrorGain, Numbers, Term, Terms};
 
 /// Candidates by their sums of products.
@@ -68,10 +68,12 @@ impl<'a> Field<'a> {
         &self.summed.layout.candidates[candidate]
     }
 
-    /// Chooses beside what is `chosen` what gains, the greatest first, and says what the others would gain in the end.
+    /// Chooses beside what is `chosen` what gains, the greatest first, and says what the others would gain in the end. No law
+    /// that goes by time alone is chosen for a joint that is `stepped`.
     pub fn search(
         &self,
         mut chosen: Vec<ChosenCandidate>,
+        stepped: &[usize],
         watch: DiagnosisWatch,
     ) -> Result<(Vec<ChosenCandidate>, Vec<RejectedCandidate>), DiagnoseError> {
         loop {
@@ -80,7 +82,10 @@ impl<'a> Field<'a> {
             let taken: Vec<&ModelEffect> = chosen.iter().map(|c| self.effect(c)).collect();
             let excluded = |i: usize| {
                 let effect = &self.candidates[i].effect;
-                taken.iter().any(|t| exclude(t, effect))
+                let by_time = effect.family() == Family::Slow;
+                let is_step = |j: usize| by_time && stepped.contains(&j);
+                own_joint(effect.place).is_some_and(is_step)
+                    || taken.iter().any(|t| exclude(t, effect))
             };
             let open = (0..self.candidates.len()).filter(|i| !excluded(*i));
             // at most a friction law for each joint, and so many effects besides

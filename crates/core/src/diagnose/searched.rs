@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::candidates::{EffectCandidate, NotTried, candidates, exclude, is_friction_law};
+use super::change::stepped_joints;
 use super::error::DiagnoseError;
 use super::outcome::FoundEffect;
 use super::polish::with_columns_of;
@@ -143,7 +144,8 @@ impl PreparedCase<'_> {
             return Err(self.nothing_determined());
         }
         let field = self.field(&candidates, &summed);
-        let errors = field.left_out(&summed.declared)?.errors();
+        let left_out = field.left_out(&summed.declared)?;
+        let errors = left_out.errors();
         let weights = &summed.declared.weights;
         let gain = compare(&torque_squares(&summed.sums), &errors, weights);
         let determined = gain.is_beyond(self.case.numbers.screen, None);
@@ -151,7 +153,8 @@ impl PreparedCase<'_> {
         let (mut chosen, mut looked) = (Vec::new(), Vec::new());
         let mut directions = Vec::new();
         if self.blocks.list.len() >= self.case.numbers.least_blocks {
-            (chosen, looked) = field.search(Vec::new(), watch)?;
+            let stepped = stepped_joints(&field, &left_out);
+            (chosen, looked) = field.search(Vec::new(), &stepped, watch)?;
             let smooth = |c: &&ChosenCandidate| {
                 let effect = field.effect(c);
                 is_friction_law(effect) && effect.law.direction.is_some()
@@ -161,7 +164,7 @@ impl PreparedCase<'_> {
             if !directions.is_empty() {
                 summed = self.summed(model.clone(), &candidates, &directions)?;
                 let field = self.field(&candidates, &summed);
-                (chosen, looked) = field.search(laws, watch)?;
+                (chosen, looked) = field.search(laws, &stepped, watch)?;
             }
         }
         let field = self.field(&candidates, &summed);

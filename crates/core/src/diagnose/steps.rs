@@ -213,13 +213,16 @@ impl EffectJudge<'_> {
         chosen: &[ChosenCandidate],
         at: usize,
     ) -> StepResult<FittedEffect> {
-        let effect = estimates.effect(&self.field, &chosen[at], at);
+        let mut effect = estimates.effect(&self.field, &chosen[at], at);
         let verified = estimates.verified(&self.field, chosen, at, self.noisier.as_deref())?;
         let judged = verified.amplitude.over_covariance;
         let covariance = estimates.covariance_of(&effect, at);
+        let covariance: Vec<f64> = covariance.iter().map(|x| judged * x).collect();
+        let told = self.field.numbers_of(&effect).deviations;
+        let with_shape = effect.hold_shape_beside_untold_sizes(&covariance, told);
         Ok(FittedEffect {
             verified,
-            covariance: covariance.iter().map(|x| judged * x).collect(),
+            covariance: with_shape.unwrap_or(covariance),
             effect,
         })
     }

@@ -1,5 +1,7 @@
 //! An effect with its numbers, as it stands in a model.
 
+use nalgebra::DMatrix;
+
 use super::{
     EffectFacts, EffectPlace, EffectScene, Family, Instant, KeyValue, Law, LimitContext, Role,
     Rule, Unit,
@@ -108,6 +110,37 @@ impl ModelEffect {
         };
         let values = keys.iter().map(|k| k.value).collect();
         (values, keys.iter().map(of).collect())
+    }
+
+    /// Holds the shape of an effect of which no size is so many deviations off zero while its shape is free: the two trade
+    /// with each other, and the torque is told by the sizes beside this shape. Gives the covariance of (shape, linear) beside
+    /// it, row-major, of that with the shape free; none where the shape stays free.
+    pub(crate) fn hold_shape_beside_untold_sizes(
+        &mut self,
+        covariance: &[f64],
+        deviations: f64,
+    ) -> Option<Vec<f64>> {
+        let (values, of_sizes) = self.sizes(covariance);
+        let told = |(k, value): (usize, &f64)| value.powi(2) >= deviations.powi(2) * of_sizes[k][k];
+        if values.iter().enumerate().any(told) {
+            return None;
+        }
+        let (shapes, size) = (self.shape.len(), self.parameters());
+        let all = DMatrix::from_row_slice(size, size, covariance);
+        let is_free = |k: &usize| all[(*k, *k)] > 0.0 && all[(*k, *k)].is_finite();
+        let free: Vec<usize> = (0..shapes).filter(is_free).collect();
+        if values.is_empty() || free.is_empty() {
+            return None;
+        }
+        let linear: Vec<usize> = (shapes..size).collect();
+        let part = |a: &[usize], b: &[usize]| all.select_rows(a).select_columns(b);
+        let by_shape = part(&free, &free).cholesky()?.solve(&part(&free, &linear));
+        let beside = part(&linear, &linear) - part(&linear, &free) * by_shape;
+        let mut held = DMatrix::zeros(size, size);
+        held.view_mut((shapes, shapes), beside.shape())
+            .copy_from(&beside);
+        self.held[..shapes].fill(true);
+        Some(held.as_slice().to_vec())
     }
 
     /// What the effect adds to joint `joint` along a scene, into `out` (zeroed before); nothing for

@@ -4,8 +4,8 @@
 
 use super::order::{order_limits, orders};
 use super::{
-    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, SpeedLadder,
-    Unit,
+    CurveSignal, Entry, Family, Key, Law, Limit, LimitedNumber, Rule, ShapeSearch, ShapeSpan,
+    SpeedLadder, Unit,
 };
 
 pub static ENTRY: Entry = Entry {
@@ -47,7 +47,11 @@ pub static LAW: Law = Law {
         let joint = cover.both_ways(place)?;
         orders(cover, place, &joint.friction_orders)
     },
-    limits: order_limits,
+    // below the orders that the travel covers friction still goes by the position: no other law begins there
+    limits: |cover, place, shape| {
+        let orders = order_limits(cover, place, shape).into_iter();
+        orders.map(ShapeSpan::open_below).collect()
+    },
     code: Some(|to| {
         to.added(format!("{} * ({})", to.direction(), to.wave()));
     }),

@@ -116,11 +116,22 @@ pub struct JointEstimate {
 /// Sizes of the two Coulomb terms over that of their sum from which they cancel.
 const CANCEL: f64 = 4.0;
 
+/// Part of the torque beyond the noise from which on something is said to act. Half: clean logs are told of it at a few
+/// thousandths; twice: a ripple of a twentieth is passed over.
+const NOTICEABLE: f64 = 0.02;
+
 impl JointEstimate {
     /// Whether the two Coulomb terms are each several times what they leave together.
     pub fn cancels(&self) -> bool {
         let (one, two) = (self.law.coulomb_1, self.law.coulomb_2);
         one.abs() + two.abs() > CANCEL * (one + two).abs()
+    }
+
+    /// Part of the torque that the innovations hold beyond the noise, where that is more than chance and what one would
+    /// notice.
+    pub fn lacking(&self) -> Option<f64> {
+        let beyond = (1.0 - 1.0 / self.nis.mean).max(0.0).sqrt() * self.relative_error;
+        (self.nis.mean > self.nis.upper_95 && beyond > NOTICEABLE).then_some(beyond)
     }
 
     /// Power that the friction takes from the joint, in the mean over the curve [W].

@@ -14,6 +14,7 @@ mod amplitude;
 mod block_errors;
 mod blocks;
 mod bounded;
+mod chance;
 mod jackknife;
 mod left_out;
 mod parts;
@@ -21,10 +22,11 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
-pub use amplitude::{EffectAmplitude, EffectTerms, JointFit, floor};
+pub use amplitude::{EffectAmplitude, EffectTerms, JointFit};
 pub use block_errors::{BlockErrors, FitToAll};
 pub use blocks::{Blocks, LogRows, TimeBlock, divide};
 pub use bounded::Bound;
+pub use chance::floor;
 pub use jackknife::{hotelling, hotelling_floor, jackknife, width_95};
 pub(crate) use left_out::weighted;
 pub use left_out::{BlocksLeftOut, ErrorGain, WholeFit, compare};

@@ -16,8 +16,8 @@ use crate::input::robot_setup::RobotSetup;
 use crate::open_loop::FreeRun;
 use crate::setup::{Finding, SetupReport};
 use cft_ident_core::diagnose::{
-    AcceptedEffect, FoundEffect, FrictionChange, JointChange, LeftCandidate, NotWritten, Signal,
-    SignalDependence, SplitErrors, StepStatus,
+    AcceptedEffect, ChangedTorque, FoundEffect, JointChange, LeftCandidate, NotWritten, Signal,
+    SignalDependence, SplitErrors, StepStatus, TorqueChange,
 };
 use cft_ident_core::effect::ModelEffect;
 use cft_ident_core::motion::Summary;
@@ -146,14 +146,16 @@ pub struct BlocksResult {
     pub block_s: f64,
 }
 
-/// Friction of a joint that changes from a time on.
+/// Torque of a joint that changes from a time on.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChangeResult {
     pub joint: String,
     pub log: String,
     /// By the log's own clock \[s\].
     pub at_s: f64,
-    /// Change at the joint's rms speed, in the unit of its torque.
+    /// What of it changes.
+    pub of: ChangedTorque,
+    /// Change, of friction at the joint's rms speed, in the unit of its torque.
     pub by: f64,
     /// Gain on blocks left out over its standard error.
     pub certainty: f64,
@@ -299,10 +301,11 @@ impl Diagnosed {
             from_s: a.from_s,
             to_s: a.to_s,
         });
-        let change = |c: &FrictionChange| ChangeResult {
+        let change = |c: &TorqueChange| ChangeResult {
             joint: names[c.joint].clone(),
             log: self.logs[c.log].clone(),
             at_s: c.at_s,
+            of: c.of,
             by: c.by,
             certainty: c.certainty,
         };

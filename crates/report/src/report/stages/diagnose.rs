@@ -12,7 +12,9 @@ use crate::report::table::{CellAlignment, Columns, Table};
 use crate::report::traces::TraceStyle;
 use crate::report::words::listed;
 use crate::report::{Report, Writer, summary};
-use cft_ident_core::diagnose::{Diagnosis, FoundEffect, LeftCandidate, SplitErrors, UseErrors};
+use cft_ident_core::diagnose::{
+    ChangedTorque, Diagnosis, FoundEffect, LeftCandidate, SplitErrors, UseErrors,
+};
 use cft_ident_core::number;
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
@@ -163,13 +165,22 @@ fn in_short(usual: &mut Writer, setup: &RobotSetup, d: &Diagnosis) {
     }
 }
 
-/// Friction that changes from a time on.
+/// Torques that change from a time on.
 fn changes(setup: &RobotSetup, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
     let shown = d.changes.iter().map(|c| {
+        let (what, meaning) = match c.of {
+            ChangedTorque::Friction => (
+                "friction",
+                "a change in time, and no law of the motion",
+            ),
+            ChangedTorque::Offset => (
+                "the constant torque",
+                "a step of the zero of its channel, and no law tells the next one; fit the part of the log before or after it",
+            ),
+        };
         format!(
-            "friction of {} changes by {} {} from {:.2} s of {} on ({} standard errors): a change in time, and no law \
-             of the motion",
+            "{what} of {} changes by {} {} from about {:.1} s of {} on ({} standard errors): {meaning}",
             setup.robot.joint_names()[c.joint],
             number::significant(c.by, 2),
             setup.file.torque_unit(c.joint),

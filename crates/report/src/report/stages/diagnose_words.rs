@@ -5,7 +5,9 @@ use super::step_words::titled;
 use crate::report::usual;
 use crate::report::words::listed;
 use crate::report::{FigureTone, FoundLine, VerdictFigure, VerdictHeadline, Writer};
-use cft_ident_core::diagnose::{Diagnosis, FoundEffect, SplitErrors, StepStatus, UseErrors};
+use cft_ident_core::diagnose::{
+    ChangedTorque, Diagnosis, FoundEffect, SplitErrors, StepStatus, TorqueChange, UseErrors,
+};
 use cft_ident_core::number;
 use cft_ident_stages::identify::{Diagnosed, DiagnosisVerdict, RobotSetup, signal_words};
 use cft_ident_stages::open_loop::JointFreeRun;
@@ -59,6 +61,7 @@ pub(super) fn words(setup: &RobotSetup, found: &Diagnosed) -> DiagnosisWords {
                 .to_owned(),
         )),
     }
+    all.extend(steps_of_zero(setup, found));
     all.extend(for_prediction(d));
     all.extend(too_few_stretches(d));
     all.extend(taken_out(setup, d));
@@ -75,6 +78,24 @@ pub(super) fn words(setup: &RobotSetup, found: &Diagnosed) -> DiagnosisWords {
         headline: headline(setup, d),
         found: all,
     }
+}
+
+/// Torque channels whose zero moves within a log.
+fn steps_of_zero(setup: &RobotSetup, found: &Diagnosed) -> Vec<FoundLine> {
+    let changes = found.diagnosis.changes.iter();
+    let steps = changes.filter(|change| change.of == ChangedTorque::Offset);
+    let line = |step: &TorqueChange| FoundLine {
+        grade: "step",
+        text: format!(
+            "the zero of the torque channel of {} moves by {} {} at about {:.1} s of {}",
+            setup.robot.joint_names()[step.joint],
+            number::significant(step.by, 2),
+            setup.file.torque_unit(step.joint),
+            step.at_s,
+            found.logs[step.log],
+        ),
+    };
+    steps.map(line).collect()
 }
 
 /// Error before, error after and what is usual.

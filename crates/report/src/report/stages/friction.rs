@@ -128,9 +128,11 @@ fn words(of: &Friction) -> (String, bool) {
                 " The curve of {joint} misses the mean torque at constant speed (see the warnings)."
             );
         }
-        let nis = &found.estimate.nis;
-        if nis.mean > nis.upper_95 {
-            doubts += &format!(" Something acts on {joint} that the friction law lacks.");
+        if let Some(part) = found.estimate.lacking() {
+            doubts += &format!(
+                " Something acts on {joint} that the friction law lacks, {} of its torque.",
+                number::percent(part)
+            );
         }
     }
     text += match doubts.as_str() {
