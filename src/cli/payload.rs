@@ -11,6 +11,7 @@ use cft_ident_report::report::table::{CellAlignment, Table};
 use cft_ident_report::report::{FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline};
 use cft_ident_stages::identify::{
     self, CarriedSpan, Dataset, IntervalNumber, Payload, PayloadReading, PayloadVerdict,
+    TouchedSpan,
 };
 use cft_ident_tool::tool::{CarriedBody, RobotController};
 
@@ -177,6 +178,19 @@ fn report(found: &Payload, logs: &str) -> Report {
         grade: "carried",
         text: carried(span),
     }));
+    findings.extend(found.touched.iter().map(|span| FoundLine {
+        grade: "touched",
+        text: touched(span),
+    }));
+    if let Some(mass) = &found.mass_with_touched {
+        findings.push(FoundLine {
+            grade: "with it",
+            text: format!(
+                "the mass is {} kg, with the gains of the model",
+                shown(mass)
+            ),
+        });
+    }
     findings.extend(found.readings.iter().filter_map(made_worse));
     all.found(findings);
     if let Some(next) = next {
@@ -202,6 +216,21 @@ fn carried(span: &CarriedSpan) -> String {
     format!(
         "{when} of {}, and not in the rest of the logs; all numbers are those of the load while it is carried",
         escape(&span.log)
+    )
+}
+
+/// A part that is left out: when, and what is left there.
+fn touched(span: &TouchedSpan) -> String {
+    let off = span.off.iter().map(|of| {
+        let size = number::significant(of.off, 2);
+        format!("{} by {size} {}", escape(&of.joint), of.unit)
+    });
+    let off: Vec<String> = off.collect();
+    let [from, to] = [span.from_s, span.to_s].map(|t| number::significant(t, 4));
+    format!(
+        "from {from} to {to} s of {} torques are off, {}, far more than in the rest: a touch? It is left out",
+        escape(&span.log),
+        off.join(", ")
     )
 }
 

@@ -35,6 +35,8 @@ struct Plant {
     noise: f64,
     /// Mass at the end of the last link \[kg\], and from when to when \[s\].
     load: (f64, [f64; 2]),
+    /// Torque with which somebody leans on both joints \[Nm\], and from when to when \[s\].
+    touch: (f64, [f64; 2]),
     /// Part of the torque of the links that the controller feeds forward.
     fed_forward: f64,
     /// When the arm begins to stop, for a second, and rests from then on \[s\].
@@ -45,6 +47,7 @@ const FREE: Plant = Plant {
     friction: [0.0; 2],
     noise: 0.0,
     load: (0.0, [0.0; 2]),
+    touch: (0.0, [0.0; 2]),
     fed_forward: 0.5,
     stops: 99.0,
 };
@@ -118,10 +121,12 @@ fn log(plant: &Plant) -> String {
                 .wrapping_add(1_442_695_040_888_963_407);
             plant.noise * ((chance >> 33) as f64 / f64::from(1u32 << 31) - 0.5)
         };
+        let [from, to] = plant.touch.1;
+        let leans = f64::from(u8::from(from <= t && t < to)) * plant.touch.0;
         let ff = tau.map(|x| plant.fed_forward * x);
         let [viscous, coulomb] = plant.friction;
         let tau: [f64; 2] = std::array::from_fn(|j| {
-            tau[j] + viscous * v[j] + coulomb * (200.0 * v[j]).tanh() + noise()
+            tau[j] + viscous * v[j] + coulomb * (200.0 * v[j]).tanh() + leans + noise()
         });
         // the drive is asked for kp (q_des - q) + kd (dq_des - dq) + tau_ff
         let dq_des = v.map(|v| 0.9 * v);
@@ -362,6 +367,90 @@ fn a_load_that_comes_and_goes_within_a_log_is_found_with_its_times() {
 }
 
 #[test]
+fn a_part_in_which_somebody_leans_on_the_arm_is_no_part_of_its_load() {
+    let folder = fitted(&REAL);
+    let path = folder.path();
+    for (load, touch, named) in [
+        ((0.8, [-1.0, 99.0]), (6.0, [8.0, 9.5]), true),
+        ((0.8, [10.0, 99.0]), (6.0, [4.0, 5.0]), true),
+        ((0.0, [0.0; 2]), (6.0, [15.0, 17.0]), true),
+        // half of the log is another story, and none of them is known to be right
+        ((0.8, [-1.0, 99.0]), (6.0, [4.0, 16.0]), false),
+    ] {
+        let plant = Plant {
+            load,
+            touch,
+            ..REAL
+        };
+        std::fs::write(path.join("loaded.csv"), log(&plant)).unwrap();
+        let (code, found, said) = run(path, "payload loaded.csv -m m.toml");
+        assert_eq!(code, 0, "{said}");
+        let spans = found["touched"].as_array().unwrap();
+        assert_eq!(
+            spans.len(),
+            usize::from(named),
+            "{load:?} {touch:?}: {spans:?}"
+        );
+        let [from, to] = touch.1;
+        for span in spans {
+            let ends = [&span["from_s"], &span["to_s"]].map(|t| t.as_f64().unwrap());
+            assert!(
+                (ends[0] - from).abs() < 0.5 && (ends[1] - to).abs() < 0.5,
+                "{span}"
+            );
+            assert!(span["off"][0]["off"].as_f64().unwrap() > 2.0, "{span}");
+            let mass = &found["readings"][0]["mass"];
+            let (value, std) = (
+                mass["value"].as_f64().unwrap(),
+                mass["std"].as_f64().unwrap(),
+            );
+            assert!(
+                (value - load.0).abs() < 0.03 && std < 0.02,
+                "{load:?}: {mass}"
+            );
+            let with_it = found["mass_with_touched"]["std"].as_f64().unwrap();
+            assert!(with_it > 2.0 * std, "{with_it} {std}");
+        }
+    }
+}
+
+#[test]
+fn a_held_pose_that_is_touched_is_named_by_the_fit_of_gravity() {
+    let mut text = "t,q_a,q_b,tau_a,tau_b\n".to_owned();
+    let mut before = [0.0; 2];
+    for k in 0..40u32 {
+        let at = f64::from(k);
+        let q = [1.4 * (2.1 * at).sin(), 1.9 * (3.7 * at + 1.0).sin()];
+        // friction of the way that each joint came
+        let friction: [f64; 2] = std::array::from_fn(|j| match k {
+            0 => 0.0,
+            _ => [0.4, 0.2][j] * (q[j] - before[j]).signum(),
+        });
+        let fore = 9.81 * 0.5 * (q[0] + q[1]).cos();
+        let noise = 0.02 * (7.3 * at).sin();
+        let leans = if k == 20 { 3.0 } else { 0.0 };
+        let tau_a = 9.81 * 1.6 * q[0].cos() + fore + friction[0] + noise + leans;
+        let tau_b = fore + friction[1] - noise;
+        writeln!(text, "{k},{:.5},{:.5},{tau_a:.5},{tau_b:.5}", q[0], q[1]).unwrap();
+        before = q;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("poses.csv", &text);
+    write("arm.toml", &format!("{ARM}\n[log]\n{MEASURED}\n"));
+    let (code, found, said) = run(
+        folder.path(),
+        "lsq --static poses.csv -r arm.toml -o g.toml",
+    );
+    assert_eq!(code, 0, "{said}");
+    let touched = found["touched"].as_array().unwrap();
+    assert!(
+        touched.len() == 1 && touched[0]["pose"] == 21,
+        "{touched:?}"
+    );
+}
+
+#[test]
 fn a_load_that_is_picked_up_is_no_course_over_time_to_a_diagnosis() {
     let plant = |load| Plant { load, ..REAL };
     let folder = fitted(&REAL);
@@ -400,4 +489,40 @@ fn what_is_held_out_is_a_part_that_the_filter_can_use() {
     let result = std::fs::read_to_string(folder.path().join("run/result.json")).unwrap();
     let result: Value = serde_json::from_str(&result).unwrap();
     assert!(!result["validate"].is_null(), "{said}");
+}
+
+#[test]
+fn the_smallest_force_that_shows_is_one_number_in_show_and_in_watch() {
+    let folder = fitted(&REAL);
+    let path = folder.path();
+    std::fs::write(
+        path.join("other.csv"),
+        log(&Plant {
+            stops: 20.0,
+            ..REAL
+        }),
+    )
+    .unwrap();
+    let (code, shown, said) = run(path, "show m.toml");
+    assert_eq!(code, 0, "{said}");
+    let (code, watched, said) = run(path, "watch other.csv -m m.toml");
+    assert_eq!(code, 0, "{said}");
+    let forces = |all: &Value, key: &str| -> Vec<Option<f64>> {
+        let all = all.as_array().unwrap().iter();
+        all.map(|joint| joint[key].as_f64()).collect()
+    };
+    let forces = [
+        forces(&shown["in_use"], "hidden_force_n"),
+        forces(&watched["joints"], "force_n"),
+    ];
+    assert!(forces[0][0].is_some_and(|force| force > 0.0), "{forces:?}");
+    assert_eq!(forces[0], forces[1]);
+    // 24 s without an alarm leave three of them possible
+    let proven = watched["proven_per_hour"].as_f64().unwrap();
+    let observed = watched["calibrated_s"].as_f64().unwrap();
+    assert!((proven * observed / 3600.0 - 3.0).abs() < 1e-9 && observed < 24.0);
+    assert!(said.contains("prove"), "{said}");
+    let (_, hourly, said) = run(path, "watch other.csv -m m.toml --false-alarms 600");
+    assert_eq!(hourly["proven_per_hour"].as_f64(), Some(600.0));
+    assert!(!said.contains("prove"), "{said}");
 }

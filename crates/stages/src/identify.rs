@@ -48,6 +48,7 @@ pub use crate::fit::motion_fit::MotionFit;
 pub use crate::fit::payload::payload;
 pub use crate::fit::payload_result::{
     CarriedSpan, GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
+    TorqueOff, TouchedSpan,
 };
 pub use crate::fit::weakest::WeakestPart;
 pub use crate::fleet::reduce::reduce;
@@ -71,7 +72,7 @@ pub use crate::input::error::IdentifyError;
 pub use crate::input::error_kind::ErrorKind;
 pub use crate::input::gain_error::GainError;
 pub use crate::input::in_memory::{InMemory, read_whole};
-pub use crate::input::in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
+pub use crate::input::in_use::{BANDWIDTH_HZ, FALSE_ALARMS_PER_HOUR, JointInUse, in_use, levers};
 pub use crate::input::log::Log;
 pub use crate::input::log_data::{LogData, has_stretch};
 pub use crate::input::model::{new_model, refined, refined_or_friction};

@@ -18,6 +18,7 @@ mod chance;
 mod jackknife;
 mod left_out;
 mod parts;
+mod set_aside;
 mod sums;
 #[cfg(test)]
 mod tests;
@@ -31,6 +32,7 @@ pub use jackknife::{hotelling, hotelling_floor, jackknife, width_95};
 pub(crate) use left_out::weighted;
 pub use left_out::{BlocksLeftOut, ErrorGain, WholeFit, compare};
 pub use parts::{PARTS, PartNumbers, agreement_on_share};
+pub use set_aside::{GroupError, kept_groups};
 pub use sums::{BlockSums, Term, TermFit, Terms};
 
 /// The numbers that decide.

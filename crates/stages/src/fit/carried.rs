@@ -29,14 +29,19 @@ const NUMBERS: CarriedNumbers = CarriedNumbers {
     ridge: 1e-9,
 };
 
-/// A run of rows that is not parted, and its sums: body, friction and offset of each joint, and what is left.
-struct Unit {
-    log: usize,
+/// A run of rows that is not parted.
+pub(super) struct Unit {
+    pub log: usize,
     /// Blocks of the rows.
     blocks: [usize; 2],
-    begin: f64,
-    end: f64,
-    sums: DMatrix<f64>,
+    pub begin: f64,
+    pub end: f64,
+}
+
+/// The units of some rows, and the unit of each block.
+pub(super) struct DividedRows {
+    pub units: Vec<Unit>,
+    pub of_block: Vec<usize>,
 }
 
 struct CarriedSearch<'a> {
@@ -44,6 +49,8 @@ struct CarriedSearch<'a> {
     n: usize,
     weights: Vec<f64>,
     units: Vec<Unit>,
+    /// Sums of each unit: body, friction and offset of each joint, and what is left.
+    products: Vec<DMatrix<f64>>,
 }
 
 /// Units in which a body acts, what it and the joints' friction are, and the squares that are left of each unit.
@@ -65,7 +72,7 @@ impl CarriedFit {
 }
 
 /// The parts of the logs in which a body acts; nothing where one that acts throughout leaves as little.
-pub(super) fn carried(rows: &Rows, names: &[String]) -> Vec<CarriedSpan> {
+pub(super) fn carried_spans(rows: &Rows, names: &[String]) -> Vec<CarriedSpan> {
     let n = rows.joints.len();
     let own = |of: &Vec<PayloadRow>| {
         let square: f64 = of.iter().map(|row| row.numbers[LEFT].powi(2)).sum();
@@ -86,9 +93,9 @@ pub(super) fn carried(rows: &Rows, names: &[String]) -> Vec<CarriedSpan> {
     found.unwrap_or_default()
 }
 
-impl<'a> CarriedSearch<'a> {
-    fn new(rows: &'a Rows, n: usize, weights: Vec<f64>) -> Self {
-        let u = STANDARD + 3 * n;
+impl DividedRows {
+    /// Cuts time into units, gaps of the clock first.
+    pub fn new(rows: &Rows) -> Self {
         let most = rows.blocks.len().div_ceil(NUMBERS.units).max(1);
         let mut units: Vec<Unit> = Vec::new();
         let mut of_block = Vec::with_capacity(rows.blocks.len());
@@ -111,7 +118,6 @@ impl<'a> CarriedSearch<'a> {
                     blocks: [block; 2],
                     begin: of.begin,
                     end: of.end,
-                    sums: DMatrix::zeros(u + 1, u + 1),
                 });
             }
             if let Some(unit) = units.last_mut() {
@@ -119,13 +125,22 @@ impl<'a> CarriedSearch<'a> {
             }
             of_block.push(units.len() - 1);
         }
+        Self { units, of_block }
+    }
+}
+
+impl<'a> CarriedSearch<'a> {
+    fn new(rows: &'a Rows, n: usize, weights: Vec<f64>) -> Self {
+        let u = STANDARD + 3 * n;
+        let DividedRows { units, of_block } = DividedRows::new(rows);
+        let mut products = vec![DMatrix::zeros(u + 1, u + 1); units.len()];
         for (j, of) in rows.joints.iter().enumerate() {
             let mut at = places(j, n, false);
             at.push(u);
             let square = weights[j] * weights[j];
             for row in of {
                 let x = |c: usize| row.numbers[if c < OWN { c } else { LEFT }];
-                let sums = &mut units[of_block[row.block]].sums;
+                let sums = &mut products[of_block[row.block]];
                 for (a, to) in at.iter().enumerate() {
                     for (b, beside) in at.iter().enumerate().take(a + 1) {
                         let product = square * x(a) * x(b);
@@ -142,6 +157,7 @@ impl<'a> CarriedSearch<'a> {
             n,
             weights,
             units,
+            products,
         }
     }
 
@@ -165,23 +181,21 @@ impl<'a> CarriedSearch<'a> {
 
     fn sums(&self, inside: &[bool]) -> DMatrix<f64> {
         let size = STANDARD + 3 * self.n + 1;
-        let units = self.units.iter().zip(inside);
+        let units = self.products.iter().zip(inside);
         units
             .filter(|(_, inside)| **inside)
-            .fold(DMatrix::zeros(size, size), |sum, (unit, _)| {
-                sum + &unit.sums
-            })
+            .fold(DMatrix::zeros(size, size), |sum, (unit, _)| sum + unit)
     }
 
     fn fitted(&self, inside: Vec<bool>) -> Option<CarriedFit> {
         let total = self.sums(&vec![true; self.units.len()]);
         let (theta, _) = self.solved(&self.sums(&inside), &total)?;
-        let left = self.units.iter().zip(&inside).map(|(unit, inside)| {
+        let left = self.products.iter().zip(&inside).map(|(unit, inside)| {
             let mut x = theta.clone().push(-1.0);
             if !inside {
                 x.rows_mut(0, STANDARD).fill(0.0);
             }
-            (x.transpose() * &unit.sums * &x)[(0, 0)].max(0.0)
+            (x.transpose() * unit * &x)[(0, 0)].max(0.0)
         });
         Some(CarriedFit {
             left: left.collect(),
@@ -201,7 +215,7 @@ impl<'a> CarriedSearch<'a> {
             for from in (0..count).filter(|k| !best.inside[*k]) {
                 let mut sums = self.sums(&best.inside);
                 for to in (from..count).take_while(|k| !best.inside[*k]) {
-                    sums += &self.units[to].sums;
+                    sums += &self.products[to];
                     let Some((_, cost)) = self.solved(&sums, &total) else {
                         continue;
                     };

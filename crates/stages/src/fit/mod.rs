@@ -23,5 +23,6 @@ pub(crate) mod payload_result;
 pub(crate) mod payload_rows;
 pub(crate) mod prior;
 pub(crate) mod replayed_torque;
+mod touched;
 pub(crate) mod weakest;
 pub(crate) mod without_load;

@@ -7,18 +7,18 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::carried::carried;
 use super::gains::LSQ_WITH_GAINS;
 use super::payload_result::{
     CarriedSpan, GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
     UNUSUAL,
 };
-use super::payload_rows::{BLOCK_S, HAT, LEFT, OWN, Rows, places, rows};
+use super::payload_rows::{BLOCK_S, HAT, LEFT, OWN, Rows, places};
+use super::touched::{LoadRows, rows_of_load};
 use crate::band::NORMAL_95;
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
 use crate::input::error::IdentifyError;
-use crate::input::in_memory::{InMemory, read_whole};
+use crate::input::in_memory::read_whole;
 use crate::input::log_data::LogData;
 use crate::input::robot_setup::RobotSetup;
 use crate::note::{ModelNote, StageNote};
@@ -67,7 +67,12 @@ pub fn payload(
     setup.check_temperatures(model, logs, &whole.stretches)?;
     let work = control.begin("payload", None);
     let names: Vec<String> = logs.iter().map(LogData::name).collect();
-    let (rows, carried) = rows_of_load(setup, model, &whole, (name, &names), control)?;
+    let LoadRows {
+        rows,
+        carried,
+        touched,
+        with_touched,
+    } = rows_of_load(setup, model, &whole, (name, &names), control)?;
     let covariance = inertial_covariance(file, model);
     let declared = has_declared_gains(file);
     let common = if declared { GAIN_DEVIATION } else { 0.0 };
@@ -77,6 +82,9 @@ pub fn payload(
         free.forget_undetermined(held);
     }
     let unusual = unusual(&rows, &readings, file);
+    let with_touched = with_touched
+        .map(|all| reading(setup, &all, &covariance, (false, common)))
+        .transpose()?;
     drop(work);
     control.check()?;
     let mut notes = whole.notes;
@@ -90,6 +98,8 @@ pub fn payload(
         verdict: PayloadVerdict::of(&readings, unusual),
         unusual,
         carried,
+        touched,
+        mass_with_touched: with_touched.map(|all| all.mass),
         link: links.last().map_or(String::new(), |link| link.name.clone()),
         readings,
         samples: rows.joints.iter().map(|rows| rows.len() as u64).sum(),
@@ -110,7 +120,8 @@ pub(crate) fn carried_in(
     let whole = read_whole(setup, logs, control)?;
     setup.check_temperatures(model, logs, &whole.stretches)?;
     let names: Vec<String> = logs.iter().map(LogData::name).collect();
-    let (rows, carried) = rows_of_load(setup, model, &whole, (&given.name, &names), control)?;
+    let LoadRows { rows, carried, .. } =
+        rows_of_load(setup, model, &whole, (&given.name, &names), control)?;
     if carried.is_empty() {
         return Ok(carried);
     }
@@ -124,24 +135,6 @@ pub(crate) fn carried_in(
     let unusual = unusual(&rows, &[held], file);
     let explains = is_body && unusual.is_none_or(|times| times <= UNUSUAL);
     Ok(if explains { carried } else { Vec::new() })
-}
-
-/// The rows in which a body is looked for, and the parts of the logs in which it acts.
-fn rows_of_load(
-    setup: &RobotSetup,
-    model: &AugmentedModel,
-    whole: &InMemory,
-    (name, logs): (&str, &[String]),
-    control: &Control,
-) -> Result<(Rows, Vec<CarriedSpan>), IdentifyError> {
-    let smear_s = setup.settings().cutoff_hz.recip();
-    let of = |spans: &[CarriedSpan]| rows(setup, model, whole, name, (spans, smear_s), control);
-    let rows = of(&[])?;
-    let carried = carried(&rows, logs);
-    Ok(match carried.is_empty() {
-        true => (rows, carried),
-        false => (of(&carried)?, carried),
-    })
 }
 
 /// Whether torques are currents whose gains the robot file declares, and no known load.

@@ -46,6 +46,29 @@ impl CarriedSpan {
     }
 }
 
+/// A torque that no body on the last link explains.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TorqueOff {
+    pub joint: String,
+    /// Root mean square of what is left of it \[unit\].
+    pub off: f64,
+    pub unit: String,
+}
+
+/// A part of a log in which something else acts on the arm than in the rest.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TouchedSpan {
+    /// Name of the log.
+    pub log: String,
+    /// Its ends, from the first row of the log on \[s\].
+    pub from_s: f64,
+    pub to_s: f64,
+    pub off: Vec<TorqueOff>,
+    /// Place of the log among those that are read.
+    #[serde(skip)]
+    pub place: usize,
+}
+
 /// What a log says of the mass on the last link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -124,6 +147,10 @@ pub struct Payload {
     pub readings: Vec<PayloadReading>,
     /// Parts of the logs in which it is carried; empty where it is throughout.
     pub carried: Vec<CarriedSpan>,
+    /// Parts of the logs that are left out, for what is left there is far from what is left of all other rows.
+    pub touched: Vec<TouchedSpan>,
+    /// The mass with them, gains as in the model; null where there are none.
+    pub mass_with_touched: Option<IntervalNumber>,
     /// How many times the usual error of the model is left of the joint of which most is; null where the model file does
     /// not say what is usual.
     pub unusual: Option<f64>,

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::payload_result::CarriedSpan;
+use super::payload_result::{CarriedSpan, TouchedSpan};
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
 use crate::input::in_memory::InMemory;
@@ -55,14 +55,38 @@ pub(super) fn places(j: usize, n: usize, gains: bool) -> Vec<usize> {
     (0..STANDARD).chain(own).chain(gain).collect()
 }
 
-/// Filters what a model leaves of every joint beside the body's own columns; `spans` are the parts in which the body acts,
-/// throughout where there are none, and rows within `smear_s` of their ends are left out.
+/// What acts on the arm, and when.
+#[derive(Clone, Copy)]
+pub(super) struct LoadParts<'a> {
+    /// Parts in which the body acts; throughout where there are none.
+    pub carried: &'a [CarriedSpan],
+    /// Parts that are left out.
+    pub touched: &'a [TouchedSpan],
+    /// Time within which filters mix both sides of an end \[s\]: its rows are left out.
+    pub smear_s: f64,
+}
+
+impl LoadParts<'_> {
+    /// Part of the body that acts at a time of a log, 0 or 1, and whether that row is left out.
+    fn at(&self, log: usize, t: f64) -> (f64, bool) {
+        let each = (self.carried.iter()).map(|span| span.holds(log, t, self.smear_s));
+        let (inside, near) = each.fold((self.carried.is_empty(), false), |(a, b), (c, d)| {
+            (a || c, b || d)
+        });
+        let touched = self.touched.iter().any(|span| {
+            span.place == log && (span.from_s - self.smear_s..span.to_s + self.smear_s).contains(&t)
+        });
+        (f64::from(u8::from(inside)), near || touched)
+    }
+}
+
+/// Filters what a model leaves of every joint beside the body's own columns.
 pub(super) fn rows(
     setup: &RobotSetup,
     model: &AugmentedModel,
     whole: &InMemory,
     name: &str,
-    (spans, smear_s): (&[CarriedSpan], f64),
+    parts: LoadParts,
     control: &Control,
 ) -> Result<Rows, IdentifyError> {
     let (n, p) = (setup.robot.joints(), model.model.theta.len());
@@ -89,13 +113,7 @@ pub(super) fn rows(
             begin: stretch.began + BLOCK_S * k as f64,
             end: end.min(stretch.began + BLOCK_S * (k + 1) as f64),
         }));
-        // where no span is given the body acts throughout
-        let carries = |t: f64| {
-            let each = spans.iter().map(|span| span.holds(stretch.log, t, smear_s));
-            let (inside, near) =
-                each.fold((spans.is_empty(), false), |(a, b), (c, d)| (a || c, b || d));
-            (f64::from(u8::from(inside)), near)
-        };
+        let carries = |t: f64| parts.at(stretch.log, t);
         let hat = model.reconstruct(stretch);
         for (j, hat) in hat.iter().enumerate() {
             // a joint that rests takes any torque up to its Coulomb level

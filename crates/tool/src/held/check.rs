@@ -47,7 +47,7 @@ pub(super) fn checks(
         }
     }
     let check = |k: usize| HoldCheck {
-        pose: k + 1,
+        pose: log.poses[k].number,
         joints: (0..n)
             .filter_map(|j| {
                 let [value, within] = expected(k, j)?;

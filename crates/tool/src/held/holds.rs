@@ -10,6 +10,8 @@ use super::error::HeldError;
 /// A pose that was held.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldPose {
+    /// Its number among the held poses of all logs, from 1.
+    pub number: usize,
     /// When it began \[s\].
     pub t: f64,
     pub rows: usize,
@@ -31,6 +33,14 @@ pub struct HeldLog {
     pub unsigned: Vec<bool>,
     /// LoggedRows of all logs.
     pub rows: usize,
+}
+
+impl HeldLog {
+    /// Poses that joint `j` reached from a side.
+    pub(super) fn from_side(&self, j: usize, side: f64) -> usize {
+        let poses = self.poses.iter();
+        poses.filter(|pose| pose.side[j] == side).count()
+    }
 }
 
 /// LoggedRows of a log in one piece.
@@ -206,6 +216,7 @@ pub fn read_held(
             let side: Vec<f64> = side.collect();
             before = Some((from, side.clone()));
             out.poses.push(HeldPose {
+                number: out.poses.len() + 1,
                 t: rows.t[from],
                 rows: to - from,
                 q,

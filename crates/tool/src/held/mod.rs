@@ -13,11 +13,12 @@ mod check;
 mod error;
 mod gravity;
 mod holds;
+mod problem;
 mod python;
 
 pub use check::HoldCheck;
 pub use error::HeldError;
-pub use gravity::{GravityFit, GravityNumber, JointAtRest, fit_gravity};
+pub use gravity::{GravityFit, GravityNumber, JointAtRest, TorqueOff, TouchedPose, fit_gravity};
 pub use holds::{HeldLog, HeldPose, read_held};
 pub use python::gravity_in_python;
 

@@ -12,7 +12,7 @@ use super::result::{
     TriedReading,
 };
 use super::search::{FoundEffects, JudgedEffect, fitted, nearest_turn, turn_in_numbers};
-use super::touch::{ToolTouch, search_without_touches};
+use super::touch::{TouchedRows, search_without_touches};
 use super::wrench_log::{PoseRow, WrenchLog, WrenchReading};
 use super::{GRAVITY, NUMBERS};
 use cft_ident_core::judge::{NUMBERS as JUDGE, jackknife, width_95};
@@ -225,8 +225,7 @@ struct ResultParts<'a> {
     held_out: Option<&'a WrenchLog>,
     reading: WrenchReading,
     reaction: bool,
-    /// The mass with rows in which something pushes the tool, and these.
-    touches: Option<(f64, Vec<ToolTouch>)>,
+    touches: Option<TouchedRows>,
 }
 
 impl ResultParts<'_> {
@@ -240,7 +239,7 @@ impl ResultParts<'_> {
         let bias = problem.base.bias();
         let open = undetermined(&self.plain.normal, bias, n);
         let width = width_95(fit.blocks.len());
-        let parameters = self.parameters(&open, width);
+        let parameters = self.parameters(fit, &open);
         let centre = parameters
             .iter()
             .filter(|p| ["cx", "cy", "cz"].contains(&p.name.as_str()));
@@ -313,11 +312,12 @@ impl ResultParts<'_> {
             after: errors(&after),
             forecast,
             last_bias: problem.last_bias(fit),
-            mass_with_touches: self.touches.as_ref().map(|(mass, _)| *mass),
+            with_touches: (self.touches.as_ref())
+                .map_or(Vec::new(), |of| self.parameters(&of.with_all, &open)),
             touches: self
                 .touches
                 .as_ref()
-                .map_or(Vec::new(), |(_, all)| all.clone()),
+                .map_or(Vec::new(), |of| of.touches.clone()),
             blocks: fit.blocks.len(),
             residuals: residuals.map(|((row, a), b)| (row.t, *a, *b)).collect(),
             has_clock: self.log.has_clock,
@@ -342,8 +342,8 @@ impl ResultParts<'_> {
     }
 
     /// Bias, mass, centre, and the inertia where the sensor moved.
-    fn parameters(&self, open: &[String], width: f64) -> Vec<ToolNumber> {
-        let (problem, fit) = (self.problem, &self.found.fit);
+    fn parameters(&self, fit: &WrenchFit, open: &[String]) -> Vec<ToolNumber> {
+        let (problem, width) = (self.problem, width_95(fit.blocks.len()));
         let bias = problem.base.bias();
         let std = |k: usize| fit.covariance[(k, k)].sqrt();
         // bias and weight look the same where poses are alike

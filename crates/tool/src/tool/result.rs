@@ -131,8 +131,8 @@ pub struct ToolResult {
     pub last_bias: [f64; 6],
     /// Rows that are left out, for something pushed the tool there.
     pub touches: Vec<ToolTouch>,
-    /// The mass with them \[kg\]; null where there are none.
-    pub mass_with_touches: Option<f64>,
+    /// The parameters with them; none where there are none.
+    pub with_touches: Vec<ToolNumber>,
     /// Blocks that intervals are made by.
     pub blocks: usize,
     /// What was left of each row, along the sensor's axes: time or number of the row, then six numbers before and

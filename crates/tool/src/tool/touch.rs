@@ -1,22 +1,19 @@
 //! Rows that tell another story than all others: somebody leans on the tool, or holds it.
 
+use std::ops::Range;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::NUMBERS;
 use super::effect::WrenchEffect;
-use super::fit::WrenchProblem;
-use super::physics::BaseColumns;
+use super::fit::{WrenchFit, WrenchProblem};
 use super::search::{FoundEffects, search};
+use cft_ident_core::judge::{GroupError, kept_groups};
 
 /// Groups of neighbours that are looked at. Half: a touch of two poses in fifty is averaged with their neighbours; twice:
 /// twice the time.
 const GROUPS: usize = 96;
-/// Part of the rows that may be left out: what holds for more is no touch.
-const MOST: f64 = 0.25;
-/// Part of the error that may be left then. Half: touches of the size of four deviations stay; twice: any model that lacks
-/// something loses its worst rows.
-const LEFT: f64 = 1.0 / 3.0;
 /// Deviations of the others from which on a row is another story.
 const FAR: f64 = 5.0;
 
@@ -54,12 +51,18 @@ fn far(e: &[f64; 6], [force, moment]: [f64; 2]) -> f64 {
     (norm(&e[..3]) / force).max(norm(&e[3..]) / moment)
 }
 
-/// The effects of a log without rows in which something pushes the tool: its other rows, the effects, the mass with all
-/// rows and what those were; of poses that are `alike` all rows stay.
+/// Rows that are left out, and the fit to all rows.
+pub(super) struct TouchedRows {
+    pub touches: Vec<ToolTouch>,
+    pub with_all: WrenchFit,
+}
+
+/// The effects of a log without rows in which something pushes the tool: its other rows, the effects, and what was left
+/// out; of poses that are `alike` all rows stay.
 pub(super) fn search_without_touches(
     problem: WrenchProblem,
     alike: bool,
-) -> (WrenchProblem, FoundEffects, Option<(f64, Vec<ToolTouch>)>) {
+) -> (WrenchProblem, FoundEffects, Option<TouchedRows>) {
     let found = search(&problem);
     let touched = without_touches(&problem, &[])
         .or_else(|| without_touches(&problem, &found.fit.effects))
@@ -68,9 +71,12 @@ pub(super) fn search_without_touches(
         None => (problem, found, None),
         Some((others, touches)) => {
             let others = others.weighted();
-            let mass = found.fit.x[BaseColumns::MASS];
+            let touched = TouchedRows {
+                touches,
+                with_all: found.fit,
+            };
             let found = search(&others);
-            (others, found, Some((mass, touches)))
+            (others, found, Some(touched))
         }
     }
 }
@@ -82,39 +88,23 @@ fn without_touches(
 ) -> Option<(WrenchProblem, Vec<ToolTouch>)> {
     let n = problem.rows.len();
     let size = n.div_ceil(GROUPS).max(1);
-    let most = (MOST * n as f64) as usize;
-    let all = vec![true; n];
-    let first = deviations(&problem.left_by(effects, &all), &all);
-    let mut kept = all;
-    loop {
-        let left = problem.left_by(effects, &kept);
-        let own = deviations(&left, &kept);
-        // a group by its mean: a single row may be noise
-        let of_group = |group: &usize| {
-            let rows = group * size..((group + 1) * size).min(n);
-            let count = rows.len() as f64;
-            let mean = std::array::from_fn(|i| {
-                left[rows.clone()].iter().map(|e| e[i]).sum::<f64>() / count
-            });
-            far(&mean, own)
+    let groups = n.div_ceil(size);
+    let of_rows = |groups: &[bool]| -> Vec<bool> { (0..n).map(|k| groups[k / size]).collect() };
+    let kept = kept_groups(groups, |kept| {
+        let left = problem.left_by(effects, &of_rows(kept));
+        let of_group = |rows: &[[f64; 6]]| {
+            let channel = |part: Range<usize>| GroupError {
+                square: rows.iter().map(|e| norm(&e[part.clone()]).powi(2)).sum(),
+                expected: rows.len() as f64,
+            };
+            vec![channel(0..3), channel(3..6)]
         };
-        let groups = (0..n.div_ceil(size)).filter(|group| kept[group * size]);
-        let worst = groups.max_by(|a, b| of_group(a).total_cmp(&of_group(b)))?;
-        kept[worst * size..((worst + 1) * size).min(n)].fill(false);
-        if kept.iter().filter(|kept| !**kept).count() > most {
-            return None;
-        }
-        let left = problem.left_by(effects, &kept);
-        let now = deviations(&left, &kept);
-        let falls = (0..2).any(|k| now[k] < LEFT * first[k]);
-        let stays = left
-            .iter()
-            .zip(&kept)
-            .all(|(e, kept)| !kept || far(e, now) < FAR);
-        if falls && stays {
-            return Some(parted(problem, &left, (&kept, size), now));
-        }
-    }
+        Some(left.chunks(size).map(of_group).collect())
+    })?;
+    let kept = of_rows(&kept);
+    let left = problem.left_by(effects, &kept);
+    let now = deviations(&left, &kept);
+    Some(parted(problem, &left, (&kept, size), now))
 }
 
 /// Rows beside those that were left out are looked at one by one.
@@ -143,7 +133,7 @@ fn parted(
             to = next;
         }
         let count = (to + 1 - from) as f64;
-        let mean = |part: std::ops::Range<usize>| {
+        let mean = |part: Range<usize>| {
             left[from..=to]
                 .iter()
                 .map(|e| norm(&e[part.clone()]))

@@ -1,7 +1,7 @@
 //! Each effect that is planted is named and no other; a clean log shows none.
 
 use crate::sensor::Sensor;
-use cft_ident_tool::tool::{ToolResult, WrenchFrame, analyse};
+use cft_ident_tool::tool::{ToolNumber, ToolResult, WrenchFrame, analyse};
 
 fn confirmed(found: &ToolResult) -> Vec<&str> {
     let stands = found.steps.iter().filter(|step| step.status == "confirmed");
@@ -196,7 +196,11 @@ fn rows_in_which_somebody_leans_on_the_tool_are_named_and_left_out() {
         );
         let mass = found.number("mass").unwrap();
         assert!((mass - sensor.mass).abs() < 0.005, "{mass}");
-        assert!((found.mass_with_touches.unwrap() - sensor.mass).abs() > 0.005);
+        let mut with_touches = found.with_touches.iter();
+        let all = with_touches.find(|p| p.name == "mass").unwrap();
+        assert!((all.value.unwrap() - sensor.mass).abs() > 0.005);
+        let width = |name: &str, of: &[ToolNumber]| of.iter().find(|p| p.name == name).unwrap().std;
+        assert!(width("mass", &found.with_touches) > width("mass", &found.parameters));
         assert!(confirmed(&found).is_empty());
     }
 }

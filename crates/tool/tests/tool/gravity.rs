@@ -2,7 +2,8 @@
 
 use cft_ident_files::config::RobotFile;
 use cft_ident_tool::held::{
-    GravityFit, HeldError, HeldLog, HeldPose, fit_gravity, gravity_in_python, read_held,
+    GravityFit, GravityNumber, HeldError, HeldLog, HeldPose, fit_gravity, gravity_in_python,
+    read_held,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -53,6 +54,7 @@ fn held(seed: u64, poses: usize, noise: f64, least: f64) -> HeldLog {
                 w + side * left * f + noise * normal
             });
             out.poses.push(HeldPose {
+                number: out.poses.len() + 1,
                 t: k as f64,
                 rows: 10,
                 tau: tau.collect(),
@@ -96,6 +98,54 @@ fn intervals_of_gravity_and_of_friction_at_rest_hold_the_truth() {
         inside.iter().all(|count| (88..=100).contains(count)),
         "{inside:?}"
     );
+}
+
+#[test]
+fn touched_poses_are_named_and_left_out_and_a_log_whose_poses_all_disagree_is_not_cured() {
+    let file = robot("");
+    let width = |all: &[GravityNumber], name: &str| {
+        let of = all.iter().find(|p| p.name == name).unwrap();
+        of.interval_95.map(|[low, high]| high - low).unwrap()
+    };
+    for seed in 0..30 {
+        let clean = held(seed, 12, 0.05, 0.8);
+        let found = fit_gravity(&clean, &file, "arm").unwrap();
+        assert!(found.touched.is_empty(), "{seed}: {:?}", found.touched);
+        // somebody leans on the fore link in the poses 7 and 8, and on the upper one in the 15th
+        let mut touched = clean.clone();
+        for (pose, tau) in [(6, [3.0, 2.0]), (7, [3.0, 2.0]), (14, [-4.0, 0.0])] {
+            (0..2).for_each(|j| touched.poses[pose].tau[j] += tau[j]);
+        }
+        let found = fit_gravity(&touched, &file, "arm").unwrap();
+        let numbers: Vec<usize> = found.touched.iter().map(|of| of.pose).collect();
+        assert_eq!(numbers, [7, 8, 15], "{seed}");
+        let off = found.touched[0].off.iter().map(|of| of.off);
+        for (off, truth) in off.zip([3.0, 2.0]) {
+            assert!((off - truth).abs() < 0.6, "{seed}: {off} {truth}");
+        }
+        assert_eq!(found.poses, 21);
+        for name in ["mx1", "mx2"] {
+            let [with, without] =
+                [&found.with_touched, &found.parameters].map(|all| width(all, name));
+            assert!(without < 0.5 * with, "{seed} {name}: {without} {with}");
+        }
+        for (interval, truth) in truth(&found).into_iter().take(2) {
+            let [low, high] = interval;
+            let room = high - low;
+            assert!(
+                low - room < truth && truth < high + room,
+                "{interval:?} {truth}"
+            );
+        }
+        // every second pose is another story, and so is each of them
+        let mut all = clean.clone();
+        for (k, pose) in all.poses.iter_mut().enumerate() {
+            pose.tau[1] += 0.3 * ((k * k) as f64).sin();
+            pose.tau[0] += if k % 3 == 0 { 3.0 } else { 0.0 };
+        }
+        let found = fit_gravity(&all, &file, "arm").unwrap();
+        assert!(found.touched.is_empty(), "{seed}: {:?}", found.touched);
+    }
 }
 
 #[test]

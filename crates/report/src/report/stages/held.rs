@@ -5,7 +5,7 @@ use crate::report::table::{CellAlignment, Table};
 use cft_ident_core::number;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_logs::log::escape;
-use cft_ident_tool::held::{GravityFit, GravityNumber, HoldCheck};
+use cft_ident_tool::held::{GravityFit, GravityNumber, HoldCheck, TouchedPose};
 
 /// Gravity's parameters, joints at rest, and poses to check them with.
 pub fn held(of: &GravityFit, path: &str, logs: &str) -> Report {
@@ -59,6 +59,11 @@ fn sentences(of: &GravityFit) -> Vec<String> {
     if of.rows_are_poses {
         out.push("each row of the log is a pose".to_owned());
     }
+    out.extend(
+        of.touched
+            .iter()
+            .map(|pose| touched_in_words(pose, of.rows_are_poses)),
+    );
     let one_sided = of
         .joints
         .iter()
@@ -71,6 +76,24 @@ fn sentences(of: &GravityFit) -> Vec<String> {
         ));
     }
     out
+}
+
+/// A pose that is set aside: when, and how much its torques are off.
+fn touched_in_words(pose: &TouchedPose, rows_are_poses: bool) -> String {
+    let when = match rows_are_poses {
+        true => String::new(),
+        false => format!(", at {} s,", number::significant(pose.t, 4)),
+    };
+    let off = pose.off.iter().map(|of| {
+        let size = number::significant(of.off, 2);
+        format!("{} by {size} {}", escape(&of.joint), of.unit)
+    });
+    let off: Vec<String> = off.collect();
+    format!(
+        "pose {}{when} is off: {}; a touch? It is left out",
+        pose.pose,
+        off.join(", ")
+    )
 }
 
 /// A number with its interval, as many digits as that deserves.
@@ -86,25 +109,32 @@ fn shown(number: &GravityNumber) -> String {
 }
 
 fn parameters(of: &GravityFit) -> Table {
-    let columns = [
+    let mut columns = vec![
         ("parameter", CellAlignment::Left),
         ("value (95 %)", CellAlignment::Left),
         ("unit", CellAlignment::Left),
         ("", CellAlignment::Left),
         ("meaning", CellAlignment::Left),
     ];
+    if !of.touched.is_empty() {
+        columns.push(("with the touched poses", CellAlignment::Left));
+    }
     let mut table = Table::new(&columns).caption(&format!(
         "gravity, with intervals by {} blocks of neighbouring poses",
         of.blocks
     ));
     for p in &of.parameters {
-        table.row([
+        let with_touched = of.with_touched.iter().find(|all| all.name == p.name);
+        let with_touched = with_touched.map_or(String::new(), shown);
+        let cells = [
             p.name.as_str(),
             &shown(p),
             &p.unit,
             p.verdict.word(),
             &p.meaning,
-        ]);
+            &with_touched,
+        ];
+        table.row(cells.into_iter().take(columns.len()));
     }
     table
 }

@@ -98,12 +98,6 @@ fn sentences(of: &ToolResult) -> Vec<String> {
     for touch in &of.touches {
         out.push(touch_in_words(touch, of.has_clock));
     }
-    if let Some(mass) = of.mass_with_touches {
-        out.push(format!(
-            "with these rows the mass is {} kg",
-            number::significant(mass, 3)
-        ));
-    }
     let drifts = of.steps.iter().any(|s| s.effect == "bias-drift");
     if let Some(forecast) = of
         .forecast
@@ -160,19 +154,24 @@ fn shown(p: &ToolNumber) -> [String; 3] {
 }
 
 fn parameters(of: &ToolResult) -> Table {
-    let columns = [
+    let mut columns = vec![
         ("", CellAlignment::Left),
         ("value (95 %)", CellAlignment::Left),
         ("unit", CellAlignment::Left),
         ("", CellAlignment::Left),
     ];
+    if !of.touches.is_empty() {
+        columns.push(("with the touched rows", CellAlignment::Left));
+    }
     let mut table = Table::new(&columns).caption(&format!(
         "along the sensor's axes, from its origin; intervals by {} blocks of neighbours",
         of.blocks
     ));
-    for p in &of.parameters {
+    for (k, p) in of.parameters.iter().enumerate() {
         let [name, value, unit] = shown(p);
-        table.row([name.as_str(), &value, &unit, p.verdict]);
+        let with_all = of.with_touches.get(k).map(|p| shown(p)[1].clone());
+        let cells = [name.as_str(), &value, &unit, p.verdict];
+        table.row(cells.into_iter().chain(with_all.as_deref()));
     }
     table
 }
