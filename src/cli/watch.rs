@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
     /// False alarms an hour that the threshold is for
-    #[arg(long, value_name = "PER_HOUR", default_value_t = 1.0, value_parser = arguments::positive)]
+    #[arg(long, value_name = "PER_HOUR", default_value_t = identify::FALSE_ALARMS_PER_HOUR, value_parser = arguments::positive)]
     pub false_alarms: f64,
     /// A log in which nothing touches the robot and which made nothing of the model: thresholds come from
     /// it, and not from the blocks that the fit set aside; may be given more than once
@@ -306,6 +306,13 @@ fn report(found: &Watched, log: &str) -> Report {
 }
 
 fn thresholds(found: &Watched) -> Table {
+    let proven = match found.proven_per_hour > found.false_alarms_per_hour {
+        true => format!(
+            " ({:.0} s of unloaded motion prove {:.0} at most)",
+            found.calibrated_s, found.proven_per_hour
+        ),
+        false => String::new(),
+    };
     let mut table = Table::new(&[
         ("joint", CellAlignment::Left),
         ("threshold", CellAlignment::Left),
@@ -314,7 +321,7 @@ fn thresholds(found: &Watched) -> Table {
         ("", CellAlignment::Left),
     ])
     .caption(&format!(
-        "thresholds for {} false alarms an hour, from slow to fast; smallest detectable force at the {}",
+        "thresholds for {} false alarms an hour{proven}, from slow to fast; smallest detectable force at the {}",
         found.false_alarms_per_hour,
         escape(&found.point)
     ));

@@ -195,15 +195,53 @@ fn input_that_ends_within_a_line_ends_with_status_3_and_what_was_seen() {
         assert!(err.contains(&format!("-:{line}")), "{err}");
         assert!(whole.starts_with(&seen) && seen.len() > whole.len() / 2);
     }
-    let wrong = text.replacen("\n1.5,", "\n1.5x,", 1);
+    // one that goes on in another form ends it where that begins
+    let wrong = text.replace("\n1.5", "\n1.5x");
     let (status, seen, err) = run(path, &watch, Some(wrong.as_bytes()));
     assert_eq!(status, 3, "{err}");
-    assert!(err.contains("-:1502") && err.contains("1.5x"), "{err}");
+    assert!(err.contains("-:1504") && err.contains("1.5x02"), "{err}");
     assert!(whole.starts_with(&seen) && !seen.is_empty());
     let json = "{\"t\": 0.0, \"q\": [0.1], \"tau\": [1.0]}\n{\"t\": 0.001, \"q\": [0.1]}\n";
     let (status, _, err) = run(path, &watch, Some(json.as_bytes()));
     assert_eq!(status, 3, "{err}");
     assert!(err.contains("-:2") && err.contains("tau_q1"), "{err}");
+}
+
+#[test]
+fn torn_rows_of_a_stream_are_passed_over_and_counted() {
+    let folder = fitted();
+    let text = csv(&rows(6, 3, &|_, _, _, _| 0.0));
+    let watch = ["watch", "-", "-m", "model.toml"];
+    let (_, whole, _) = run(folder.path(), &watch, Some(text.as_bytes()));
+    let last =
+        |lines: &str| -> Value { serde_json::from_str(lines.lines().last().unwrap()).unwrap() };
+    let external = |line: &Value| line["joints"][0]["external"].as_f64().unwrap();
+    let line = |t: &str| {
+        text.lines()
+            .find(|line| line.starts_with(t))
+            .unwrap()
+            .to_owned()
+    };
+    // a field that is lost, a byte that is another one, a row that an end of line cuts in two
+    let row = line("1.5,");
+    let cut = row.rfind(',').unwrap();
+    let halves = [&row[..cut], "\n", &row[cut + 2..]].concat();
+    for (torn, count) in [
+        (row[..cut].to_owned(), "1"),
+        (row.replacen('5', "x", 1), "1"),
+        (halves, "2"),
+    ] {
+        let text = text.replacen(&row, &torn, 1);
+        let (status, seen, err) = run(folder.path(), &watch, Some(text.as_bytes()));
+        assert_eq!(status, 0, "{torn}: {err}");
+        let words = format!("{count} rows are torn and are passed over");
+        assert!(
+            err.contains(&words) && err.contains("-:1502"),
+            "{torn}: {err}"
+        );
+        let off = external(&last(&seen)) - external(&last(&whole));
+        assert!(off.abs() < 1e-3, "{torn}: {off}");
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::held_out::hold_out::{Held, on_other_logs};
 use crate::input::control::Control;
 use crate::input::dataset::GivenModel;
 use crate::input::error::IdentifyError;
-use crate::input::in_use::levers;
+use crate::input::in_use::{AlarmTorque, levers};
 use crate::input::log::Log;
 use crate::input::log_data::LogData;
 use crate::input::repeated::each_log_once;
@@ -22,7 +22,6 @@ use crate::observe::{
     recipe,
 };
 use cft_ident_core::motion::{FilterSettings, ZeroOrderHold};
-use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::held_out::{HeldOut, TorqueExcesses};
 use cft_ident_logs::log::{Block, Instant, Provenance, Reader};
 
@@ -85,6 +84,9 @@ pub struct Watched {
     pub point: String,
     /// False alarms an hour that were asked for.
     pub false_alarms_per_hour: f64,
+    /// The rate that the unloaded motion proves, with 95 %: that which was asked for, or the greatest that its time
+    /// without an alarm leaves possible, where that is more.
+    pub proven_per_hour: f64,
     /// Time of unloaded motion from which the threshold was found [s].
     pub calibrated_s: f64,
     /// Time by which external torques are late [s].
@@ -270,18 +272,13 @@ pub fn watch(
     let (levers, point) = levers(setup, &middle);
     let names = held.joints.iter().enumerate();
     let joints = names.map(|(j, held)| {
-        let sizes = held.external_std.iter();
-        let sizes = sizes.map(|std| threshold * std * held.external_99);
-        let least = sizes.clone().fold(f64::INFINITY, f64::min);
+        let alarm = AlarmTorque::of(held, threshold, setup.robot.joint_kind(j), levers[j]);
         WatchedJoint {
             joint: held.joint.clone(),
             unit: setup.file.torque_unit(j).to_owned(),
-            threshold: [least, sizes.fold(0.0, f64::max)],
-            force_n: match setup.robot.joint_kind(j) {
-                JointKind::Prismatic => Some(least),
-                JointKind::Revolute => levers[j].map(|lever| least / lever),
-            },
-            blind: least > BLIND_SHARE * held.torque_seen,
+            threshold: alarm.ends,
+            force_n: alarm.force_n,
+            blind: alarm.ends[0] > BLIND_SHARE * held.torque_seen,
         }
     });
     let joints: Vec<WatchedJoint> = joints.collect();
@@ -291,6 +288,7 @@ pub fn watch(
         point,
         joints,
         false_alarms_per_hour: settings.per_hour,
+        proven_per_hour: proven_rate(excesses).max(settings.per_hour),
         calibrated_s: excesses.observed_s,
         delay_s: observer.delay_s(),
         samples,
@@ -330,12 +328,20 @@ fn blind(joints: &[WatchedJoint], held: &[HeldOut]) -> Vec<ModelNote> {
     noted.collect()
 }
 
+/// Events in a time without one that chance leaves possible with 95 %: exp(-3) = 0.05.
+const UNSEEN: f64 = 3.0;
+
+/// Alarms an hour of which unloaded motion without one proves that they are not more.
+fn proven_rate(excesses: &TorqueExcesses) -> f64 {
+    UNSEEN * 3600.0 / excesses.observed_s
+}
+
 /// A rate that the calibration is too short for.
 fn far(excesses: &TorqueExcesses, per_hour: f64) -> Option<ModelNote> {
-    let hours = excesses.observed_s / 3600.0;
-    (hours * per_hour < 1.0).then_some(ModelNote::Extrapolated {
+    let proven_per_hour = proven_rate(excesses);
+    (per_hour < proven_per_hour).then_some(ModelNote::Extrapolated {
         per_hour,
         observed_s: excesses.observed_s,
-        excesses: excesses.clusters,
+        proven_per_hour,
     })
 }

@@ -199,6 +199,12 @@ pub enum LogError {
         "write one object a line: {{\"t\": .., \"q\": [..], \"tau\": [..]}}, or the columns by their names"
     )]
     JsonLine { at: String, problem: String },
+    /// A row of JSON without one of the numbers that are read.
+    #[explain(
+        "{at}: has no number {key}",
+        "write one object a line: {{\"t\": .., \"q\": [..], \"tau\": [..]}}, or the columns by their names"
+    )]
+    JsonNumber { at: String, key: String },
     /// The input ends within a line.
     #[explain("{at}: the input ends within this line", "what came before it is used")]
     CutLine { at: String },
@@ -297,4 +303,14 @@ pub enum LogError {
         "this is no text log, or a quote is never closed"
     )]
     LongLine { at: String, limit: usize },
+}
+
+impl LogError {
+    /// Whether a row that lost some of its bytes is refused so.
+    pub(super) fn is_of_a_torn_row(&self) -> bool {
+        matches!(
+            self,
+            Self::Fields { .. } | Self::NotANumber { .. } | Self::JsonLine { .. }
+        )
+    }
 }

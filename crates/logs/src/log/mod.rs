@@ -36,6 +36,7 @@ mod temperatures;
 mod text;
 mod time;
 mod time_unit;
+mod torn;
 mod two_clocks;
 mod unit;
 

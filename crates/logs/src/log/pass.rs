@@ -16,6 +16,7 @@ use super::stream::HashedReader;
 use super::text::{JsonRows, TextRows};
 use super::time::Instant;
 use super::time_unit::{UNIT_ROWS, first_numbers, is_stated, unstated};
+use super::torn::WholeRows;
 use super::{LogError, LogSpec, Span};
 
 /// Usual steps from a time of 0 to the next one where the clock began at 0.
@@ -203,10 +204,10 @@ impl LogPass {
         let is_json = content.head().trim_ascii_start().starts_with(b"{");
         let (rows, layout): (Box<dyn LogRows>, Layout) = if is_json {
             let (rows, layout) = JsonRows::open(path, content, layout)?;
-            (Box::new(rows), layout)
+            (Box::new(WholeRows::new(rows)), layout)
         } else {
             let (rows, layout, _) = TextRows::open(path, content, layout, RowStrictness::Refuse)?;
-            (Box::new(rows), layout)
+            (Box::new(WholeRows::new(rows)), layout)
         };
         Ok(Self {
             watch,

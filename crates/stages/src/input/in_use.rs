@@ -1,4 +1,4 @@
-//! What the error of a model means where it is used: the force that it hides, the lag that it leaves.
+//! What the error of a model means where it is used: the smallest force that shows, the lag that it leaves.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -8,10 +8,13 @@ use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::model::Model;
 use cft_ident_core::robot::tree::pose::{driven, frames};
 use cft_ident_core::robot::tree::space::{Vector, add, cross, turn};
+use cft_ident_files::config::held_out::HeldOut;
 use cft_ident_files::config::{ModelFile, RobotFile};
 
 /// Bandwidth of the position loop that a lag is reported for \[Hz\]: that of a usual industrial arm.
 pub const BANDWIDTH_HZ: f64 = 5.0;
+/// False alarms an hour for which a smallest force is said where no other rate is asked for.
+pub const FALSE_ALARMS_PER_HOUR: f64 = 1.0;
 /// Lever below which a torque is reported as it is \[m\].
 const MIN_LEVER_M: f64 = 0.05;
 
@@ -28,7 +31,8 @@ pub struct JointInUse {
     /// Lever of the point below about the joint in the middle of the positions seen \[m\]; null for a joint that
     /// slides, and where it is too short to speak of.
     pub lever_m: Option<f64>,
-    /// Force at that point that the band hides \[N\]; null where there is no lever.
+    /// Smallest force at that point of which `watch` gives an alarm, at one false alarm an hour \[N\]; null where there
+    /// is no lever, or no threshold was learnt.
     pub hidden_force_n: Option<f64>,
     /// What a feed-forward by this model leaves to a position loop of 5 Hz \[m or rad\]; null where the inertia is
     /// not known.
@@ -39,6 +43,30 @@ pub struct JointInUse {
     pub positions_seen: [f64; 2],
     /// Greatest speed \[m/s or rad/s\].
     pub speed_seen: f64,
+}
+
+/// What a joint must feel before an alarm is given.
+pub(crate) struct AlarmTorque {
+    /// Least and greatest torque over the ranges of speed, the parameters' own deviation aside \[N or Nm\].
+    pub ends: [f64; 2],
+    /// Force that the least stands for \[N\]; none where the joint has no lever.
+    pub force_n: Option<f64>,
+}
+
+impl AlarmTorque {
+    /// `threshold` is that of the external torque over its 99 % deviation, `lever` that of the joint \[m\].
+    pub fn of(held: &HeldOut, threshold: f64, kind: JointKind, lever: Option<f64>) -> Self {
+        let sizes = held.external_std.iter();
+        let sizes = sizes.map(|std| threshold * std * held.external_99);
+        let least = sizes.clone().fold(f64::INFINITY, f64::min);
+        Self {
+            ends: [least, sizes.fold(0.0, f64::max)],
+            force_n: match kind {
+                JointKind::Prismatic => Some(least),
+                JointKind::Revolute => lever.map(|lever| least / lever),
+            },
+        }
+    }
 }
 
 /// The point that forces are reported at and its name: the first frame of the file, or the end of the last link.
@@ -117,6 +145,8 @@ pub fn in_use(
         tau[j] - weight[j]
     };
     let stiffness = (std::f64::consts::TAU * BANDWIDTH_HZ).powi(2);
+    let learnt = file.excesses.as_ref();
+    let threshold = learnt.map(|learnt| learnt.threshold(FALSE_ALARMS_PER_HOUR));
     let joints = file.held_out.iter().enumerate().map(|(j, held)| {
         let widths = held.half_width_95.iter().flatten();
         let half = widths.fold(0.0, |most: f64, x| most.max(*x));
@@ -128,10 +158,8 @@ pub fn in_use(
             torque_seen: held.torque_seen,
             half_width_95: half,
             lever_m: levers[j],
-            hidden_force_n: match kind {
-                JointKind::Prismatic => Some(half),
-                JointKind::Revolute => levers[j].map(|lever| half / lever),
-            },
+            hidden_force_n: threshold
+                .and_then(|threshold| AlarmTorque::of(held, threshold, kind, levers[j]).force_n),
             lag: (inertia > 0.0).then(|| half / (inertia * stiffness)),
             position_unit: kind.position_unit().to_owned(),
             positions_seen: held.positions_seen,

@@ -317,11 +317,11 @@ pub enum ModelNote {
         torque: f64,
         unit: String,
     },
-    /// The threshold of alarms is extrapolated: false alarms an hour, time observed \[s\], excesses seen.
+    /// The threshold of alarms is extrapolated: false alarms an hour, time observed \[s\], the rate that it proves.
     Extrapolated {
         per_hour: f64,
         observed_s: f64,
-        excesses: u64,
+        proven_per_hour: f64,
     },
 }
 

@@ -97,6 +97,11 @@ impl JsonRows {
         LogError::JsonLine { at, problem }
     }
 
+    fn lacks(&self, key: String) -> LogError {
+        let at = self.place();
+        LogError::JsonNumber { at, key }
+    }
+
     /// Reads the next line that is not blank; false at the end.
     fn advance(&mut self) -> Result<bool, LogError> {
         loop {
@@ -147,7 +152,7 @@ impl LogRows for JsonRows {
             true => Ok(Some(RowTime::Seconds(t))),
             false => {
                 let key = escape(&self.slots.keys[0].0);
-                Err(self.wrong(format!("has no number `{key}`, the time")))
+                Err(self.lacks(format!("`{key}`, the time")))
             }
         }
     }
@@ -156,7 +161,7 @@ impl LogRows for JsonRows {
         let [(_, _, n), (_, _, k), _] = self.slots.lists;
         if let Some(place) = (1..1 + n + k).find(|i| !is_usable(self.values[*i])) {
             let key = escape(&self.slots.keys[place].0);
-            return Err(self.wrong(format!("has no number `{key}`")));
+            return Err(self.lacks(format!("`{key}`")));
         }
         block.q.extend_from_slice(&self.values[1..1 + n]);
         block.tau.extend_from_slice(&self.values[1 + n..1 + n + k]);

@@ -109,7 +109,7 @@ fn verdict(of: &ShowReport) -> DiagnosisWords {
 /// The error in use.
 fn uses(to: &mut Writer, joints: &[JointInUse], point: &str) {
     let caption = format!(
-        "what the error means: 95 % band of the torque, and the smallest force at the {} that shows",
+        "what the error means: 95 % band of the torque where it is widest, mostly in reversals, and the smallest force at the {} of which `watch` gives an alarm at one false alarm an hour",
         escape(point)
     );
     let columns = Columns::new(&caption, joints)

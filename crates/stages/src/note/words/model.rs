@@ -99,10 +99,10 @@ impl Display for ModelNote {
             Self::Extrapolated {
                 per_hour,
                 observed_s,
-                excesses,
+                proven_per_hour,
             } => write!(
                 f,
-                "the threshold for {per_hour} false alarms an hour goes beyond what {observed_s:.0} s of unloaded motion show ({excesses} excesses): it is extrapolated; more of it makes it surer: longer logs for the fit, or `--unloaded LOG`"
+                "{observed_s:.0} s of unloaded motion prove {proven_per_hour:.0} false alarms an hour at most, and {per_hour} is extrapolated: another motion may give more; longer logs for the fit prove more, or `--unloaded LOG`"
             ),
         }
     }
