@@ -32,6 +32,7 @@ mod few_blocks;
 mod friction_prior;
 mod from_log_to_use;
 mod gains;
+mod held_poses;
 #[allow(
     dead_code,
     reason = "a folder with a good log is all that is wanted of it"
