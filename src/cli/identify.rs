@@ -22,8 +22,9 @@ use cft_ident_report::report::sections::residual;
 use cft_ident_report::report::stages;
 use cft_ident_report::report::stages::identify::ShownLogs;
 use cft_ident_stages::identify::{
-    self, Dataset, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction,
-    IdentifyError, IdentifySettings, Log, LogData, RobotSetup, StageEnd, Validated,
+    self, Dataset, DiagnoseEnd, DiagnosisResult, FilteredMotion, IdentifiedDynamics,
+    IdentifiedFriction, IdentifyError, IdentifySettings, Log, LogData, RobotSetup, StageEnd,
+    Validated,
 };
 use cft_ident_stages::replay::ReplayedDiagnosis;
 use cft_ident_stages::setup::Finding;
@@ -200,21 +201,21 @@ impl IdentifyJob {
         };
         let data = Dataset::read(&setup, &logs_of(all), &context.control)?;
         data.check_moving()?;
-        let is_usable = |spec: &LogSpec| {
-            let of = logs_of(std::slice::from_ref(spec));
-            let found = match LogData::read_all(&setup, &of, &[&data.logs], &context.control) {
-                Ok(part) => identify::has_stretch(&setup, &part, &context.control),
-                Err(error) => Err(error),
-            };
+        let motion_of = |specs: &[LogSpec], beside: Option<&FilteredMotion>| {
+            let of = logs_of(specs);
+            let parts = LogData::read_all(&setup, &of, &[&data.logs], &context.control);
+            let found = parts.and_then(|parts| {
+                FilteredMotion::of_logs(&setup, &parts, beside, &context.control)
+            });
             match found {
                 // the whole log is read by now: what keeps a part from a fit is its place
-                Err(error) if !matches!(error, IdentifyError::Interrupted) => Ok(false),
+                Err(error) if !matches!(error, IdentifyError::Interrupted) => Ok(None),
                 found => Ok(found?),
             }
         };
-        let logs = held_out::parted(all, &is_usable)?;
+        let logs = held_out::parted(all, &motion_of)?;
         if logs.validation.is_empty() {
-            let text = "no part of a log is held out, for none is long enough for the filter beside the rest: the error on data that were not fitted is not known";
+            let text = "no part of a log is held out, for none is long enough for the filter and moves where the rest does: the error on data that were not fitted is that of blocks set aside";
             warnings.push(text.to_owned());
         }
         let of = file_name(file);

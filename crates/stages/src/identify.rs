@@ -70,11 +70,12 @@ pub use crate::input::curve::friction_curve;
 pub use crate::input::dataset::{Dataset, GivenModel};
 pub use crate::input::error::IdentifyError;
 pub use crate::input::error_kind::ErrorKind;
+pub use crate::input::filtered_motion::FilteredMotion;
 pub use crate::input::gain_error::GainError;
 pub use crate::input::in_memory::{InMemory, read_whole};
 pub use crate::input::in_use::{BANDWIDTH_HZ, FALSE_ALARMS_PER_HOUR, JointInUse, in_use, levers};
 pub use crate::input::log::Log;
-pub use crate::input::log_data::{LogData, has_stretch};
+pub use crate::input::log_data::LogData;
 pub use crate::input::model::{new_model, refined, refined_or_friction};
 pub use crate::input::position_cutoff::PositionCutoff;
 pub use crate::input::reduced::{

@@ -8,7 +8,6 @@ use super::free_swing::moves_freely;
 use super::log::{Log, arrays_layout};
 use super::reference::LoggedReference;
 use super::robot_setup::RobotSetup;
-use cft_ident_core::motion::{self, MotionError, RunError};
 use cft_ident_logs::log::{Layout, LogError, RowFault, escape};
 use cft_ident_logs::recording::{Recording, RecordingRequest, RowBlocks, TorqueCourse};
 
@@ -245,36 +244,6 @@ impl RobotSetup {
         }
         Ok(greatest)
     }
-}
-
-/// Whether the filter finds a stretch that is long enough in each of these logs.
-///
-/// # Errors
-/// Logs that fits refuse.
-pub fn has_stretch(
-    setup: &RobotSetup,
-    logs: &[LogData],
-    control: &Control,
-) -> Result<bool, IdentifyError> {
-    let (n, settings) = (setup.robot.joints(), setup.settings());
-    for log in logs {
-        let mut blocks = log.blocks(control)?;
-        let run = motion::run(
-            &mut |block| blocks.read(block),
-            n,
-            &settings,
-            None,
-            1,
-            &|_, out| out.fill(0.0),
-            &mut |_| {},
-        );
-        match run {
-            Err(RunError::Motion(MotionError::NoSegment { .. })) => return Ok(false),
-            Err(error) => return Err(log.to_stage_error(&blocks, error)),
-            Ok(_) => {}
-        }
-    }
-    Ok(true)
 }
 
 /// Raises each number to another where that is greater.

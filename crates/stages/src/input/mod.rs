@@ -5,6 +5,7 @@ pub(crate) mod curve;
 pub(crate) mod dataset;
 pub(crate) mod error;
 pub(crate) mod error_kind;
+pub(crate) mod filtered_motion;
 pub(crate) mod free_swing;
 pub(crate) mod gain_error;
 pub(crate) mod in_memory;

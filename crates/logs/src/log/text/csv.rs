@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::listed::ListedJoints;
 use super::records::{BUFFER, LONGEST_ROW, TextRecord, TextRecords};
-use super::table::TextTable;
+use super::table::{TextTable, is_datum};
 use super::{head, number};
 use crate::log::content::FileContent;
 use crate::log::layout::Layout;
@@ -395,6 +395,23 @@ impl TextFile {
         Instant::parse_decimal(field, power)
             .or_else(comma)
             .or_else(|| Instant::parse_iso(field))
+    }
+
+    /// The first column in which another word stands than in the row before.
+    #[cold]
+    pub(super) fn other_word(&self) -> Option<&str> {
+        let is_word = |field: &[u8]| {
+            let text = String::from_utf8_lossy(field);
+            !text.trim().is_empty() && !is_datum(text.trim())
+        };
+        let changes = |column: &usize| {
+            let pair = [self.record.get(*column)?, self.previous.get(*column)?];
+            Some(pair[0] != pair[1] && pair.into_iter().all(is_word))
+        };
+        // where runs of spaces part the fields, those of the row before are not known
+        let mut columns = 0..self.header.len();
+        let column = columns.find(|column| self.runs.is_none() && changes(column) == Some(true));
+        column.map(|column| &*self.header[column])
     }
 
     pub(super) fn is_date(&self, column: usize) -> bool {

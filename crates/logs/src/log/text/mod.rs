@@ -176,8 +176,10 @@ impl LogRows for TextRows {
         }
         match (self.stamp(), self.strictness, self.time) {
             (Some(stamp), ..) => {
-                let number = |place: usize| self.file.number(place);
-                Ok(Some(self.runs.take(stamp, self.even.is_some(), number)))
+                let (file, even) = (&self.file, self.even.is_some());
+                let number = |place: usize| file.number(place);
+                let other_word = || file.other_word();
+                Ok(Some(self.runs.take(stamp, even, number, other_word)))
             }
             (None, RowStrictness::Refuse, Some(time)) => Err(self.file.no_number(time.index)),
             (None, ..) => Ok(Some(RowTime::NONE)),

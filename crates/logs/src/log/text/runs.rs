@@ -1,4 +1,4 @@
-//! Runs in one table, as episodes of a data set or trials of a test stand: what parts them, and times that go on.
+//! Runs in one table, as episodes of a data set or tests of a stand: what parts them, and times that go on.
 
 use crate::log::names::escape;
 use crate::log::time::{Instant, RowTime};
@@ -6,7 +6,8 @@ use crate::log::time::{Instant, RowTime};
 /// Time between the last row of a run and the first of the next, where their own times do not part them \[s\]: longer
 /// than any filter reaches.
 const BETWEEN_RUNS_S: f64 = 10.0;
-/// Steps that a run has at least, where nothing but its time says that it is one.
+/// Steps that a run has at least, where nothing but its time says that it is one, and that pass at least between tests
+/// that words name.
 const MIN_STEPS: i128 = 10;
 /// Runs whose beginnings are kept.
 const MAX_RUNS: usize = 1 << 16;
@@ -86,6 +87,8 @@ pub(super) struct TableRuns {
     /// Times at which runs begin, but for the first.
     pub(super) seams: Vec<RowTime>,
     by_time: bool,
+    /// A column of words that change where time leaps.
+    by_words: Option<String>,
     shifted: bool,
 }
 
@@ -110,13 +113,14 @@ impl TableRuns {
         }
     }
 
-    /// Takes a row: its time, which a log of a given rate has none of its own for, and its numbers; the time that it
-    /// is handed out with.
-    pub(super) fn take(
+    /// Takes a row: its time, which a log of a given rate has none of its own for, its numbers, and the name of a
+    /// column in which another word stands than in the row before; the time that it is handed out with.
+    pub(super) fn take<'a>(
         &mut self,
         stamp: RowTime,
         even: bool,
         number: impl Fn(usize) -> Option<f64>,
+        other_word: impl Fn() -> Option<&'a str>,
     ) -> RowTime {
         let mut marked = false;
         for column in &mut self.marks {
@@ -141,6 +145,12 @@ impl TableRuns {
         }
         let anew =
             now < last && now.0 <= first.0 + self.step && last.0 - first.0 > MIN_STEPS * self.step;
+        // tests of one file: words name them, and time leaps between them
+        let leaps = !even && self.step > 0 && now.0 - last.0 > MIN_STEPS * self.step;
+        if leaps && let Some(name) = other_word() {
+            marked = true;
+            self.by_words.get_or_insert_with(|| name.to_owned());
+        }
         let begins = match even {
             true => marked,
             false => (now <= last && marked) || anew,
@@ -170,7 +180,9 @@ impl TableRuns {
     pub(super) fn in_words(&self) -> Option<String> {
         let marks = self.marks.iter().filter(|column| column.parts);
         let mut parted: Vec<String> = marks
-            .map(|column| format!("`{}`", escape(&column.name)))
+            .map(|column| &column.name)
+            .chain(&self.by_words)
+            .map(|name| format!("`{}`", escape(name)))
             .collect();
         if self.by_time {
             parted.push("times that begin anew".to_owned());
@@ -208,7 +220,7 @@ mod tests {
         let mut runs = TableRuns::new(&names);
         let each = rows.iter().map(|(t, row)| {
             let stamp = RowTime::Seconds(*t);
-            let out = runs.take(stamp, even, |place| row.get(place).copied());
+            let out = runs.take(stamp, even, |place| row.get(place).copied(), || None);
             out.instant().seconds()
         });
         (each.collect(), runs)
