@@ -47,7 +47,11 @@ pub(super) fn of_robot(log: &RawReader, setup: &RobotSetup) -> (ColumnPlan, Vec<
     let missing = temperatures(log, setup, &mut known);
     let columns = known.into_iter().enumerate();
     let channels = columns.filter(|(column, _)| Some(*column) != time);
-    let channels = channels.map(|(column, known)| known.unwrap_or_else(|| other(log, column)));
+    let unnamed = |column| ChannelColumn {
+        unused: true,
+        ..other(log, column)
+    };
+    let channels = channels.map(|(column, known)| known.unwrap_or_else(|| unnamed(column)));
     let plan = ColumnPlan {
         time: time.map(|time| (time, seconds)),
         channels: channels.collect(),
@@ -107,8 +111,7 @@ fn place(
             let Some(column) = log.find(channel).filter(|column| known[*column].is_none()) else {
                 continue;
             };
-            // of a controller's law the commands of all joints stand behind one another
-            let (j, law) = (j % layout.joints.len(), layout.section.torque.is_some());
+            let (j, law) = (layout.joint_of(j), layout.section.torque.is_some());
             let role = match role {
                 ChannelRole::Torque if law => ChannelRole::Command,
                 role => role,
@@ -149,6 +152,7 @@ fn place(
                 offset: channel.offset,
                 wrap: channel.wrap,
                 channel: seen,
+                unused: false,
             });
         }
     }
@@ -169,6 +173,7 @@ fn as_it_is(column: usize, channel: InspectedChannel) -> ChannelColumn {
         offset: 0.0,
         wrap: None,
         channel,
+        unused: false,
     }
 }
 

@@ -104,6 +104,7 @@ fn looked_at(
         let found = look_again(&mut open()?, &mut plan, &findings, &stop)?;
         findings = found.ok_or_else(CliError::interrupted)?;
     }
+    plan.ease_unused(&mut findings);
     findings.faults.splice(0..0, refused);
     findings.place();
     Ok((findings, log))

@@ -74,6 +74,8 @@ mod serial_urdf;
 mod setup;
 mod simulate_serial;
 mod temperature;
+mod tests_in_one_file;
+mod tool_conventions;
 mod track;
 mod two_arms;
 mod watch;

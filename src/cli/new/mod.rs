@@ -345,10 +345,12 @@ pub(super) fn describe(
     let arm = chain.as_ref();
     let arm = arm.and_then(|chain| arm_alone(chain, &mapping, &held, args));
     if let Some(command) = &arm {
-        let without = mapping.joints.iter().filter(|joint| !has_columns(joint));
+        let (with, without): (Vec<&JointColumns>, Vec<_>) =
+            (mapping.joints.iter()).partition(|joint| has_columns(joint));
+        let last = with.last().map_or("", |joint| &joint.joint);
         warnings.push(format!(
-            "the log has no columns of {}; where they stood still, the arm is described without them: `{command}`",
-            cft_ident_logs::log::list(without.map(|joint| joint.joint.as_str()))
+            "the log has no columns of {}; where they stood still, the arm is described without them: `{command}`; one that moves as one with a joint that was logged says so in the URDF: `<mimic joint=\"{last}\" multiplier=\"1\"/>` in its <joint>",
+            cft_ident_logs::log::list(without.iter().map(|joint| joint.joint.as_str()))
         ));
     }
     let (shape, model, cutoff_hz) = (draft.shape.clone(), draft.model(), draft.cutoff_hz());

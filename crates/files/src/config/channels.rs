@@ -8,8 +8,8 @@ use cft_ident_core::robot::cft::actuation::ENCODER_SCALE;
 use cft_ident_core::robot::cft::{COORDINATES, LaboratorySetup, pantograph};
 use cft_ident_core::robot::tree::MOST_JOINTS;
 use cft_ident_logs::log::{
-    ActuatorChannels, Channel, ChannelChoice, ControllerTorque, DeclaredChannels, JointChannels,
-    Layout, LogSection, PositionUnit, RowConversion, TorqueUnit, channel,
+    ActuatorChannels, Channel, ChannelChoice, ControllerTorque, DeclaredChannels, FurtherCommand,
+    JointChannels, Layout, LogSection, PositionUnit, RowConversion, TorqueUnit, channel,
 };
 
 impl RobotFile {
@@ -219,23 +219,25 @@ impl RobotFile {
             let joints = robot.joint_names();
             layout.conversion = (asked.pd.of(joints.len()))
                 .map(|gains| of_controller(gains, asked.velocity_command.is_some()));
-            let further = asked.further().flat_map(|(key, column)| {
+            let named = FurtherCommand::ALL.into_iter();
+            let named = named.filter_map(|command| Some((command, asked.columns_of(command)?)));
+            let further = named.flat_map(|(command, column)| {
                 let each = layout.positions.iter().zip(joints).enumerate();
                 each.map(move |(place, (position, joint))| {
                     let named = Channel {
                         wrap: None,
                         offset: 0.0,
                         column: column.of(place, joint),
-                        key: Some(format!("[log] torque.{key}")),
+                        key: Some(format!("[log] torque.{}", command.key())),
                         ..position.clone()
                     };
-                    match key {
-                        "feed_forward" => Channel {
+                    match command {
+                        FurtherCommand::Velocity => named,
+                        FurtherCommand::Torque => Channel {
                             unit: String::new(),
                             factor: position.factor.signum(),
                             ..named
                         },
-                        _ => named,
                     }
                 })
             });

@@ -10,7 +10,8 @@ use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::JointKind;
 use cft_ident_core::robot::cft::COORDINATES;
 use cft_ident_logs::log::{
-    ActuatorChannels, ColumnName, JointChannels, LogSection, PositionUnit, TorqueIs, TorqueUnit,
+    ActuatorChannels, ColumnName, FurtherCommand, JointChannels, LogSection, PositionUnit,
+    TorqueIs, TorqueUnit,
 };
 
 /// Checks the `[log]` section of a robot file.
@@ -143,7 +144,9 @@ fn controller(file: &RobotFile, document: &TomlDocument) -> Result<(), ConfigErr
         }
     }
     let command = asked.command.iter().map(|column| ("command", column));
-    for (key, column) in command.chain(asked.further()) {
+    let further = FurtherCommand::ALL.into_iter();
+    let further = further.filter_map(|kind| Some((kind.key(), asked.columns_of(kind)?)));
+    for (key, column) in command.chain(further) {
         if !column.fits(joints.len()) {
             return Err(document.value(
                 &["log", "torque", key],

@@ -322,10 +322,10 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
     ];
     let commands = layout.section.torque.is_some();
     let each = kinds.into_iter().flat_map(|(channels, role, saturates)| {
-        let joints = channels.iter().zip(layout.joints.iter().cycle());
-        joints
-            .enumerate()
-            .map(move |(place, (channel, joint))| InspectedChannel {
+        let each = channels.iter().enumerate();
+        each.map(move |(place, channel)| {
+            let joint = &layout.joints[layout.joint_of(place)];
+            InspectedChannel {
                 saturates,
                 delivers: match role {
                     ChannelRole::Torque if !volts => layout.torque_limit(joint),
@@ -344,7 +344,8 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
                     Some(joint),
                     None,
                 )
-            })
+            }
+        })
     });
     each.collect()
 }

@@ -1,7 +1,9 @@
 //! Shows a log, as it stands in its files, to the judge.
 
+use std::collections::BTreeSet;
+
 use super::channel::InspectedChannel;
-use super::fault::{FaultKind, Severity};
+use super::fault::{FaultKind, LogFault, Severity};
 use super::findings::{LogFindings, RowCost};
 use super::judge::{InspectionDepth, LogJudge};
 use super::words::ChannelRole;
@@ -23,6 +25,8 @@ pub struct ChannelColumn {
     pub wrap: Option<f64>,
     /// What it is.
     pub channel: InspectedChannel,
+    /// There is a robot file, and it does not name the column: what is wrong with it keeps nobody from a fit.
+    pub unused: bool,
 }
 
 /// Which columns of a table are what.
@@ -43,6 +47,20 @@ pub struct ColumnPlan {
 }
 
 impl ColumnPlan {
+    /// Makes notes of errors that are of columns which nothing uses.
+    pub fn ease_unused(&self, found: &mut LogFindings) {
+        let unused = self.channels.iter().filter(|column| column.unused);
+        let unused: BTreeSet<&String> = unused.map(|column| &column.channel.name).collect();
+        let of_unused = |fault: &&mut LogFault| {
+            let name = fault.channel.as_ref();
+            fault.severity == Severity::Error && name.is_some_and(|name| unused.contains(name))
+        };
+        for fault in found.faults.iter_mut().filter(of_unused) {
+            fault.severity = Severity::Info;
+        }
+        found.sort();
+    }
+
     /// Whether a look by it found what hides the rest, so that another one sees more ([`look_again`]).
     pub fn hides(&self, found: &LogFindings) -> bool {
         let turning = |(place, _): &(usize, f64)| self.channels[*place].wrap.is_none();

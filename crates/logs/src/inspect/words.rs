@@ -6,6 +6,8 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::log::FurtherCommand;
+
 /// What a channel holds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -28,6 +30,14 @@ pub enum ChannelRole {
 }
 
 impl ChannelRole {
+    /// What a further command of a controller asks for.
+    pub const fn of_command(command: FurtherCommand) -> Self {
+        match command {
+            FurtherCommand::Velocity => Self::Velocity,
+            FurtherCommand::Torque => Self::Torque,
+        }
+    }
+
     /// Whether it is the motion or what drives it, whose shape is looked at.
     pub(super) fn has_shape(self) -> bool {
         matches!(self, Self::Position | Self::Velocity | Self::Torque)

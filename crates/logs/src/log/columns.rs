@@ -32,14 +32,12 @@ pub(super) struct Header<'a> {
 impl Header<'_> {
     pub(super) fn columns(&self, layout: &Layout) -> Result<ScaledColumns, LogError> {
         let each = |channels: &[Channel], what: &str, of: &[UnitKind]| {
-            let found =
-                channels
-                    .iter()
-                    .zip(layout.joints.iter().cycle())
-                    .map(|(channel, joint)| {
-                        let found = self.find(channel, &format!("{what} of {joint}"))?;
-                        Ok((channel, joint, found))
-                    });
+            let found = channels.iter().enumerate().map(|(place, channel)| {
+                let joint = layout.joints.get(layout.joint_of(place));
+                let joint = joint.map_or("", String::as_str);
+                let found = self.find(channel, &format!("{what} of {joint}"))?;
+                Ok((channel, joint, found))
+            });
             let found = found.collect::<Result<Vec<_>, LogError>>()?;
             // what stands in brackets and differs from joint to joint names them
             let stated: Vec<_> = (found.iter())

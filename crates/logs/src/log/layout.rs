@@ -137,7 +137,7 @@ pub struct Layout {
     /// Positions in joint order.
     pub positions: Vec<Channel>,
     /// Torques in joint order; empty: the log need not have any and the blocks have none. Behind one of each joint
-    /// may stand more of which the conversion makes those.
+    /// may stand more of which the conversion makes those, as [`Layout::joint_of`] says.
     pub torques: Vec<Channel>,
     /// Velocities in joint order; read only where the log has all of them.
     pub velocities: Vec<Channel>,
@@ -182,6 +182,12 @@ impl Layout {
     /// Largest torque that the drive of a joint delivers, where the robot file says so.
     pub fn torque_limit(&self, joint: &str) -> Option<f64> {
         self.section.joint.get(joint)?.torque_limit
+    }
+
+    /// Place of the joint that a channel is of, by its place among those of its kind: behind one of each joint stand
+    /// the further commands of a controller's law, each kind in joint order again.
+    pub fn joint_of(&self, place: usize) -> usize {
+        place % self.joints.len().max(1)
     }
 
     /// What its positions are, in words.

@@ -53,8 +53,8 @@ pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnDelimiter, ColumnName, ColumnsOfJoints, ControllerGains,
-    ControllerTorque, JointChannels, LogSection, RowFault, StampSource, TimeUnit, TorqueIs,
-    TorqueSign,
+    ControllerTorque, FurtherCommand, JointChannels, LogSection, RowFault, StampSource, TimeUnit,
+    TorqueIs, TorqueSign,
 };
 pub use shared::shares_rows;
 pub use source::{DataRole, Provenance, begins_with, sha256};

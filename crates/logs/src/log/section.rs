@@ -271,15 +271,33 @@ pub struct ControllerTorque {
     pub feed_forward: Option<ColumnsOfJoints>,
 }
 
+/// What a controller may be asked for beside a position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FurtherCommand {
+    Velocity,
+    Torque,
+}
+
+impl FurtherCommand {
+    /// In the order in which they stand behind the commands of the positions.
+    pub const ALL: [Self; 2] = [Self::Velocity, Self::Torque];
+
+    /// The key in `[log] torque` that names its columns.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity_command",
+            Self::Torque => "feed_forward",
+        }
+    }
+}
+
 impl ControllerTorque {
-    /// The keys that name columns beside the command of the position, each with its columns.
-    pub fn further(&self) -> impl Iterator<Item = (&'static str, &ColumnsOfJoints)> {
-        let keys = [
-            ("velocity_command", &self.velocity_command),
-            ("feed_forward", &self.feed_forward),
-        ];
-        keys.into_iter()
-            .filter_map(|(key, column)| Some((key, column.as_ref()?)))
+    /// The columns of a command beside that of the position, where the file names them.
+    pub fn columns_of(&self, command: FurtherCommand) -> Option<&ColumnsOfJoints> {
+        match command {
+            FurtherCommand::Velocity => self.velocity_command.as_ref(),
+            FurtherCommand::Torque => self.feed_forward.as_ref(),
+        }
     }
 }
 

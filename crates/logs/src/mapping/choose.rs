@@ -12,8 +12,8 @@ use super::shown::shown;
 use super::units::{in_degrees, of_positions, of_torques, other_velocity, stated_position};
 use super::urdf_joint::UrdfJoint;
 use crate::inspect::ChannelRole;
-use crate::inspect::words::without_joint;
-use crate::log::{ColumnsOfJoints, TORQUES, UnitKind, escape, stated_unit};
+use crate::inspect::words::{NamedDrive, drive, without_joint, words};
+use crate::log::{ColumnsOfJoints, FurtherCommand, TORQUES, UnitKind, escape, stated_unit};
 use cft_ident_core::robot::JointKind;
 
 /// One joint and its columns.
@@ -287,8 +287,11 @@ impl Mapping {
         let (found, columns) = paired(tau);
         let limits: Vec<Option<f64>> = found.iter().map(|k| known[*k].torque).collect();
         let units = of_torques(&columns, &limits);
-        let mut each = units.iter();
-        let current = each.any(|unit| unit.drive && matches!(unit.unit, Some("A" | "mA" | "uA")));
+        let mut each = units.iter().zip(&columns);
+        let current = each.any(|(unit, column)| match unit.unit {
+            Some("A" | "mA" | "uA") => unit.drive,
+            _ => unit.drive && drive(&words(&column.name)) == NamedDrive::Current,
+        });
         for (k, unit) in found.iter().zip(units) {
             let joint = &mut self.joints[*k];
             (joint.torque_unit, joint.torque_scale) = (unit.unit, unit.scale);
@@ -296,7 +299,8 @@ impl Mapping {
         }
         if current && self.torque_is == "joint" {
             self.torque_is = "current";
-            if self.joints.len() > 1 {
+            let scaled = |check: &String| check.contains("give torque_scale");
+            if self.joints.len() > 1 && !self.checks.iter().any(scaled) {
                 self.checks.push("torques: motor currents; give torque_scale of each joint, torque constant times gear ratio".to_owned());
             }
         }
@@ -333,7 +337,9 @@ impl Mapping {
             let name = joint.torque.as_deref();
             name.is_none_or(|name| name == format!("tau_{}", joint.joint))
         };
-        let any = self.joints.iter().any(|joint| joint.torque.is_some());
+        // what is no torque by its unit is asked for its gain
+        let torque = |joint: &JointColumns| joint.torque.is_some() && joint.is_torque();
+        let any = self.joints.iter().any(torque);
         let own = !seen.is_recording() && self.joints.iter().all(contract);
         if any && !own && self.torque_is == "joint" {
             let effort = match seen.is_recording() {
@@ -380,12 +386,10 @@ fn law_line(columns: &[LogColumn], joints: &[&str], beside: Option<&str>) -> Opt
         })
     };
     let command = asked(ChannelRole::Position)?;
-    let further = [
-        ("velocity_command", asked(ChannelRole::Velocity)),
-        ("feed_forward", asked(ChannelRole::Torque)),
-    ];
-    let further = further.into_iter();
-    let further = further.filter_map(|(key, column)| Some(format!(", {key} = {}", column?)));
+    let further = FurtherCommand::ALL.into_iter().filter_map(|command| {
+        let column = asked(ChannelRole::of_command(command))?;
+        Some(format!(", {} = {column}", command.key()))
+    });
     Some(format!(
         "; of a drive that is asked for kp (command - q) + kd (velocity_command - dq) + feed_forward, the torque is `torque = {{ pd = [kp, kd], command = {command}{} }}` in [log], in place of `torque` of the joints",
         further.collect::<String>()

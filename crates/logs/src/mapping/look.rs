@@ -137,6 +137,7 @@ pub fn look(
             offset: 0.0,
             wrap: None,
             channel: InspectedChannel::new(&column.name, column.role, joint, None),
+            unused: false,
         }
     });
     let plan = ColumnPlan {

@@ -15,6 +15,9 @@ const MAX_TRAVEL_M: f64 = 20.0;
 /// Largest torque of a joint \[Nm\]: the largest arms stay below it.
 const MAX_TORQUE_NM: f64 = 2e4;
 
+/// Range of a number of 16 bits.
+const WORD: f64 = 65_536.0;
+
 /// A unit, as the keys of a joint in `[log.joint]` say it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Unit {
@@ -232,6 +235,7 @@ pub(super) fn of_positions(columns: &[&LogColumn], joints: &[&UrdfJoint]) -> Vec
 /// The units of the torques of all joints; `limits` are those of the robot [Nm or N], where known.
 pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<Unit> {
     let guessed = guessed_torque(columns, limits);
+    let current = guessed_current(columns);
     let stated = stated_by_all(columns, &|_, _| true, &TORQUES);
     let of = |(k, column): (usize, &&LogColumn)| match (&stated[k], drive(&words(&column.name))) {
         (Some(SaidUnit::Unknown(unit)), _) => Unit::unknown(column, unit, "torque"),
@@ -252,7 +256,7 @@ pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<
                 ..Unit::times(unit, *times)
             }
         }
-        (None, NamedDrive::Current) => driving("A"),
+        (None, NamedDrive::Current) => current.clone(),
         (None, NamedDrive::Voltage) => driving("V"),
         // one sentence for all of them
         (None, _) => Unit {
@@ -315,6 +319,20 @@ fn rated(what: &str, unit: &'static str, part: &str) -> Unit {
     }
 }
 
+/// What the numbers of currents suggest, where no name says a unit.
+fn guessed_current(columns: &[&LogColumn]) -> Unit {
+    if !columns.iter().all(|column| column.whole) {
+        return driving("A");
+    }
+    let most = columns.iter().map(|c| c.largest()).fold(0.0, f64::max);
+    Unit {
+        check: Some(format!(
+            "whole numbers up to {most} that are called currents, and no name says amperes: counts of a drive? then give torque_scale of each joint, N or Nm per count; where they are milliamperes, torque_unit = \"mA\""
+        )),
+        ..driving("counts")
+    }
+}
+
 /// What the sizes of torques suggest, where no name says a unit.
 fn guessed_torque(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
     let largest: Vec<f64> = columns.iter().map(|c| c.largest()).collect();
@@ -328,6 +346,12 @@ fn guessed_torque(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
         false => known.iter().any(|ratio| *ratio > 30.0),
     };
     let whole = columns.iter().all(|c| c.whole);
+    if whole && most <= 3000.0 && columns.iter().any(|c| c.torque_wrap == Some(WORD)) {
+        let what = format!(
+            "whole numbers of 16 bits up to {most}: permille, as drives by CiA 402 give a torque?"
+        );
+        return rated(&what, "permille", "100");
+    }
     if whole && most <= 300.0 {
         return rated(&format!("whole numbers up to {most}: percent?"), "%", "100");
     }
@@ -441,7 +465,14 @@ mod tests {
             assert!(check.contains("percent"), "{check}");
         }
         assert_eq!(torque("tau_1", 150_300.5, false).scale, Some(1e-3));
-        assert!(torque("actual_current_0", 4.0, false).drive);
+        assert_eq!(torque("actual_current_0", 4.0, false), driving("A"));
+        assert_eq!(torque("present_current", 137.0, true).unit, Some("counts"));
+        let word = LogColumn {
+            torque_wrap: Some(WORD),
+            ..column("actual_torque", 164.0, true)
+        };
+        let permille = one(of_torques(&[&word], &[None]));
+        assert_eq!(permille.unit, Some("permille"));
         // beside the limits of the robot
         let tau = column("tau_1", 9000.5, false);
         let small = one(of_torques(&[&tau], &[Some(12.0)]));

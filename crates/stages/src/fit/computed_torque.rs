@@ -10,7 +10,7 @@ use crate::input::unknowns::FittedUnknown;
 use crate::note::{FitNote, StageNote};
 use cft_ident_core::inertia::columns::JointTerm;
 use cft_ident_logs::inspect::{ChannelRole, commanded_role};
-use cft_ident_logs::log::escape;
+use cft_ident_logs::log::{FurtherCommand, escape};
 
 /// What no drive shows that was measured.
 struct NoDrive {
@@ -55,22 +55,17 @@ pub(crate) fn unused_commands(
     let Some(law) = &setup.file.log.torque else {
         return Vec::new();
     };
-    let used: Vec<&str> = law.further().map(|(key, _)| key).collect();
     let mut out = Vec::new();
-    for (key, role) in [
-        ("velocity_command", ChannelRole::Velocity),
-        ("feed_forward", ChannelRole::Torque),
-    ] {
-        if used.contains(&key) {
-            continue;
-        }
+    let unnamed = |command: &FurtherCommand| law.columns_of(*command).is_none();
+    for command in FurtherCommand::ALL.into_iter().filter(unnamed) {
+        let role = ChannelRole::of_command(command);
         let is_asked = |name: &str| commanded_role(name) == Some(role);
         let names = logs.iter().map(|log| log.recording().columns(&is_asked));
         let mut columns: Vec<String> = names.flatten().map(|name| escape(&name)).collect();
         columns.dedup();
         columns.truncate(setup.robot.joints());
         if !columns.is_empty() {
-            out.push((key, columns));
+            out.push((command.key(), columns));
         }
     }
     out

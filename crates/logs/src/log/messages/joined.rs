@@ -89,7 +89,7 @@ impl JoinedTopics {
         let kinds = [&layout.positions, &layout.torques, &layout.velocities];
         let all = kinds.into_iter().flat_map(|of| of.iter().enumerate());
         for (place, channel) in all {
-            let joint = place % layout.joints.len().max(1);
+            let joint = layout.joint_of(place);
             let Some((topic, path)) = parted(&channel.column) else {
                 let column = escape(&channel.column);
                 return Err(refused(

@@ -69,10 +69,18 @@ fn sentences(of: &ToolResult) -> Vec<String> {
             number::significant(other, 3)
         ),
     });
-    if of.readings.len() > 2 {
+    let taken = of.reading.orientation;
+    let others = of
+        .readings
+        .iter()
+        .filter(|r| r.reading.orientation != taken);
+    let next = others.min_by(|a, b| a.force_error.total_cmp(&b.force_error));
+    if let Some(next) = next {
         out.push(format!(
-            "orientations are {}",
-            of.reading.orientation.words()
+            "orientations are {}: read as {}, the next best, {} N are left",
+            taken.words(),
+            next.reading.orientation.words(),
+            number::significant(next.force_error, 3)
         ));
     }
     if of.reaction {
