@@ -1,4 +1,4 @@
-//! An effect that acts in one short passage of a log.
+//! What acts in a short passage of a log, from a time on, or over less than a wave of the travel.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -16,6 +16,7 @@ kind = "revolute"
 [friction]
 law = "viscous-coulomb"
 fitted_with_inertias = true
+offset = true
 
 [filter]
 cutoff_hz = 20
@@ -34,8 +35,16 @@ type Waves = [(f64, f64); 2];
 const FAST: Waves = [(0.3, 11.1), (0.06, 23.3)];
 const OTHER: Waves = [(0.8, 2.7), (0.3, 8.1)];
 
-/// 20 s at 200 Hz of an inertia with viscous, Coulomb and Stribeck friction, 66 times slower in these spans of time.
-fn log(seed: u64, waves: Waves, slow: &[[f64; 2]], stribeck: f64) -> String {
+/// A torque by time, position and speed.
+type Added<'a> = &'a dyn Fn(f64, f64, f64) -> f64;
+
+/// A fall of friction near rest.
+fn stribeck(c: f64) -> impl Fn(f64, f64, f64) -> f64 {
+    move |_, _, v| c * v.signum() * (-(v / 0.08).powi(2)).exp()
+}
+
+/// 20 s at 200 Hz of an inertia with viscous and Coulomb friction, 66 times slower in these spans of time.
+fn log(seed: u64, waves: Waves, slow: &[[f64; 2]], added: Added) -> String {
     let mut chance = ChaCha8Rng::seed_from_u64(seed);
     let mut noise = || 0.02 * ((0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0);
     let rate_of_phase = |t: f64| {
@@ -53,8 +62,7 @@ fn log(seed: u64, waves: Waves, slow: &[[f64; 2]], stribeck: f64) -> String {
         let dq = sum(&|a, w| a * w * (w * s).cos());
         let ddq = sum(&|a, w| -a * w * w * (w * s).sin());
         let (v, a) = (dq * ds, ddq * ds * ds + dq * dds);
-        let near_rest = stribeck * v.signum() * (-(v / 0.08).powi(2)).exp();
-        let torque = 0.03 * a + 0.25 * v + 0.5 * v.signum() + near_rest + noise();
+        let torque = 0.03 * a + 0.25 * v + 0.5 * v.signum() + added(t, q, v) + noise();
         writeln!(text, "{t:.3},{q:.6},{torque:.6}").unwrap();
         s += 0.5 * dt * (ds + rate_of_phase(t + dt));
     }
@@ -73,38 +81,68 @@ fn run(folder: &Path, line: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{line}: {said}"))
 }
 
-/// What `diagnose` writes of such a log, and the error on another motion before and after.
-fn diagnosed(seed: u64, stribeck: f64) -> (Vec<Value>, [f64; 2]) {
+/// What `diagnose` says of a log, what of it is written, and the error on another motion before and after.
+struct Tried {
+    document: Value,
+    written: Vec<Value>,
+    errors: [f64; 2],
+}
+
+impl Tried {
+    fn names(&self) -> Vec<&str> {
+        let names = self.written.iter().map(|step| step["effect"].as_str());
+        names.map(Option::unwrap).collect()
+    }
+
+    fn number(&self, key: &str) -> f64 {
+        let number = &self.written[0]["parameters"][key]["value"];
+        number.as_f64().unwrap()
+    }
+}
+
+/// Fitted to a log and diagnosed by it, with another one unseen.
+fn diagnosed(fitted: &str, unseen: &str) -> Tried {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("robot.toml", ROBOT);
-    write("fitted.csv", &log(seed, FAST, &[[8.0, 9.0]], stribeck));
-    let slow = [[4.0, 5.0], [14.0, 15.0]];
-    write("unseen.csv", &log(seed + 50, OTHER, &slow, stribeck));
+    write("fitted.csv", fitted);
+    write("unseen.csv", unseen);
     run(folder.path(), "lsq fitted.csv -r robot.toml -o before.toml");
-    let found = run(
+    let document = run(
         folder.path(),
         "diagnose fitted.csv -m before.toml -o after.toml",
     );
-    let steps = found["steps"].as_array().unwrap().iter();
+    let steps = document["steps"].as_array().unwrap().iter();
     let written = steps.filter(|step| step["written"] == true).cloned();
+    let written = written.collect();
     let error = |model: &str| {
         let document = run(folder.path(), &format!("validate unseen.csv -m {model}"));
         document["joints"][0]["relative_error_moving"]
             .as_f64()
             .unwrap()
     };
-    (written.collect(), ["before.toml", "after.toml"].map(error))
+    Tried {
+        errors: ["before.toml", "after.toml"].map(error),
+        written,
+        document,
+    }
+}
+
+/// A log with one slow second, and another motion with two.
+fn with_a_slow_second(seed: u64, added: Added) -> Tried {
+    let slow = [[4.0, 5.0], [14.0, 15.0]];
+    let unseen = log(seed + 50, OTHER, &slow, added);
+    diagnosed(&log(seed, FAST, &[[8.0, 9.0]], added), &unseen)
 }
 
 #[test]
 fn a_fall_of_friction_that_one_slow_second_shows_is_named_and_lowers_the_error_of_another_motion() {
     for seed in 0..3 {
-        let (written, [before, after]) = diagnosed(seed, 0.35);
-        let names: Vec<&Value> = written.iter().map(|step| &step["effect"]).collect();
-        assert_eq!(names, ["stribeck"], "{seed}");
-        let c = written[0]["parameters"]["c"]["value"].as_f64().unwrap();
+        let tried = with_a_slow_second(seed, &stribeck(0.35));
+        assert_eq!(tried.names(), ["stribeck"], "{seed}");
+        let c = tried.number("c");
         assert!((c - 0.35).abs() < 0.04, "{seed}: {c}");
+        let [before, after] = tried.errors;
         assert!(
             before > 0.03 && after < 0.75 * before,
             "{seed}: {before} {after}"
@@ -115,8 +153,46 @@ fn a_fall_of_friction_that_one_slow_second_shows_is_named_and_lowers_the_error_o
 #[test]
 fn a_slow_second_without_one_names_nothing() {
     for seed in 0..3 {
-        let (written, [before, after]) = diagnosed(seed, 0.0);
-        assert!(written.is_empty(), "{seed}: {written:?}");
-        assert!((after - before).abs() < 1e-9);
+        let tried = with_a_slow_second(seed, &stribeck(0.0));
+        assert_eq!(tried.names(), [""; 0], "{seed}");
+        assert!((tried.errors[1] - tried.errors[0]).abs() < 1e-9);
     }
+}
+
+#[test]
+fn a_step_of_the_zero_of_a_channel_is_no_drift_and_is_told_with_its_time_and_size() {
+    for seed in 0..3 {
+        let step = |t: f64, _, _| if t < 11.3 { 0.0 } else { 0.15 };
+        let fitted = log(seed, OTHER, &[], &step);
+        let tried = diagnosed(&fitted, &log(seed + 50, OTHER, &[], &stribeck(0.0)));
+        assert_eq!(tried.names(), [""; 0], "{seed}");
+        let changes = tried.document["changes"].as_array().unwrap();
+        assert_eq!((changes.len(), &changes[0]["of"]), (1, &"offset".into()));
+        let number = |key: &str| changes[0][key].as_f64().unwrap();
+        assert!((number("by") - 0.15).abs() < 0.01, "{changes:?}");
+        // by blocks, of which there are 24
+        assert!((number("at_s") - 11.3).abs() < 0.9, "{changes:?}");
+    }
+}
+
+#[test]
+fn a_drift_is_no_step() {
+    let tried = diagnosed(
+        &log(1, OTHER, &[], &|t, _, _| 0.01 * t),
+        &log(51, OTHER, &[], &stribeck(0.0)),
+    );
+    assert_eq!(tried.names(), ["drift"]);
+    assert!((tried.number("c") - 0.01).abs() < 1e-3);
+    assert_eq!(tried.document["changes"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn friction_that_goes_by_less_than_a_wave_and_a_half_of_the_travel_is_named() {
+    // four waves a turn, of which the travel of 2.2 rad covers 1.4
+    let waving = |_, q: f64, v: f64| 0.05 * v.signum() * (4.0 * q + 0.4).sin();
+    let motion = |seed| log(seed, OTHER, &[], &waving);
+    let tried = diagnosed(&motion(2), &motion(52));
+    assert_eq!(tried.names(), ["position-friction"]);
+    let [before, after] = tried.errors;
+    assert!(before > 0.02 && after < 0.5 * before, "{before} {after}");
 }

@@ -189,7 +189,7 @@ fn joints_that_one_drive_moves_get_the_line_of_the_urdf_that_says_so() {
         .as_f64()
         .unwrap();
     assert!(error < 0.01, "{error}");
-    // without its columns `new` prints the same line
+    // without its columns `new` prints such a line
     let bare: String = moved_by_one_drive()
         .lines()
         .fold(String::new(), |text, row| {
@@ -203,5 +203,6 @@ fn joints_that_one_drive_moves_get_the_line_of_the_urdf_that_says_so() {
     let (code, found, said) = run_line(folder.path(), "new apart --urdf apart.urdf --log bare.csv");
     assert_eq!(code, 0, "{said}");
     let warnings = found["warnings"].to_string().replace('\\', "");
+    let line = "<mimic joint=\"b\" multiplier=\"1\"/>";
     assert!(warnings.contains(line), "{warnings}");
 }

@@ -344,14 +344,8 @@ pub(super) fn describe(
     }
     let arm = chain.as_ref();
     let arm = arm.and_then(|chain| arm_alone(chain, &mapping, &held, args));
-    if let Some(command) = &arm {
-        let (with, without): (Vec<&JointColumns>, Vec<_>) =
-            (mapping.joints.iter()).partition(|joint| has_columns(joint));
-        let last = with.last().map_or("", |joint| &joint.joint);
-        warnings.push(format!(
-            "the log has no columns of {}; where they stood still, the arm is described without them: `{command}`; one that moves as one with a joint that was logged says so in the URDF: `<mimic joint=\"{last}\" multiplier=\"1\"/>` in its <joint>",
-            cft_ident_logs::log::list(without.iter().map(|joint| joint.joint.as_str()))
-        ));
+    if let Some(text) = without_columns(&mapping, arm.as_deref()).filter(|_| chain.is_some()) {
+        warnings.push(text);
     }
     let (shape, model, cutoff_hz) = (draft.shape.clone(), draft.model(), draft.cutoff_hz());
     Ok(RobotDraft {
@@ -365,6 +359,22 @@ pub(super) fn describe(
         mapping,
         seen,
     })
+}
+
+/// What is to be done about joints that a log of others has no columns of; `arm` is the command that leaves them out, where
+/// they are no part between others.
+fn without_columns(mapping: &Mapping, arm: Option<&str>) -> Option<String> {
+    let (with, without): (Vec<&JointColumns>, Vec<_>) =
+        (mapping.joints.iter()).partition(|joint| has_columns(joint));
+    let last = with.last().filter(|_| !without.is_empty())?;
+    let still = arm.map_or_else(String::new, |command| {
+        format!(" where they stood still, the arm is described without them: `{command}`;")
+    });
+    Some(format!(
+        "the log has no columns of {};{still} one that moves as one with a joint that was logged says so in the URDF: `<mimic joint=\"{}\" multiplier=\"1\"/>` in its <joint>",
+        cft_ident_logs::log::list(without.iter().map(|joint| joint.joint.as_str())),
+        last.joint,
+    ))
 }
 
 /// Lines of a terminal that say what is to be looked at.

@@ -51,7 +51,7 @@ pub struct JointAtRest {
 
 /// A torque that is not that of the other poses.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct TorqueOff {
+pub struct PoseTorqueOff {
     pub joint: String,
     /// What is left of it by the other poses.
     pub off: f64,
@@ -65,7 +65,7 @@ pub struct TouchedPose {
     pub pose: usize,
     /// When it began \[s\].
     pub t: f64,
-    pub off: Vec<TorqueOff>,
+    pub off: Vec<PoseTorqueOff>,
 }
 
 /// Gravity of an arm.
@@ -116,7 +116,7 @@ pub fn fit_gravity(log: &HeldLog, file: &RobotFile, name: &str) -> Result<Gravit
         pose: log.poses[k].number,
         t: log.poses[k].t,
         off: (problem.residual(&(k..k + 1), &x).into_iter())
-            .map(|(j, off)| TorqueOff {
+            .map(|(j, off)| PoseTorqueOff {
                 joint: names[j].clone(),
                 off,
                 unit: file.torque_unit(j).to_owned(),

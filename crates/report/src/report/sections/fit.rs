@@ -78,9 +78,10 @@ fn heat(page: &mut Writer, covariance: &Covariance) {
     page.figure(figure.svg());
 }
 
-/// Parameters of a model whose estimates are correlated.
+/// Parameters of a model whose estimates are correlated; of one that holds a part of an effect those of its estimates.
 pub fn pairs(page: &mut Writer, model: &ModelFile) {
-    let Some(covariance) = &model.covariance else {
+    let estimates = || model.estimate_covariance.as_ref();
+    let Some(covariance) = model.covariance.as_ref().or_else(estimates) else {
         return;
     };
     heat(page, covariance);
