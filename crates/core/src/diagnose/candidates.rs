@@ -202,6 +202,18 @@ pub fn shape_end(
     ends.next()
 }
 
+/// Whether these data tell no shape: one stands at an end of its range, whatever begins beyond it.
+pub fn is_untold(
+    model: &AugmentedModel,
+    case: &DiagnosisCase,
+    cover: &LogCoverage,
+    effect: &ModelEffect,
+) -> bool {
+    let ranges = shape_ranges(model, case, cover, effect).into_iter();
+    let mut shapes = ranges.zip(&effect.shape);
+    shapes.any(|(range, value)| range.stands_at(*value) != [false; 2])
+}
+
 /// Why an effect with its numbers is no finding, where it is none: a shape stands at an end of its range, beyond which
 /// the law is another or nothing is left of it; it has no torque; or its numbers together are none that a machine has.
 pub fn no_finding(

@@ -61,12 +61,16 @@ impl ShapeSpan {
         }
     }
 
+    /// Whether a value stands at the lower end, and at the upper one.
+    pub fn stands_at(&self, value: f64) -> [bool; 2] {
+        let near = NEAR * value.abs();
+        [value <= self.least + near, value >= self.most - near]
+    }
+
     /// The end, of those beyond which another law begins, at which a value stands.
     pub fn end_at(&self, value: f64) -> Option<f64> {
-        let near = NEAR * value.abs();
-        let below = !self.open[0] && value <= self.least + near;
-        let above = !self.open[1] && value >= self.most - near;
-        match (below, above) {
+        let [below, above] = self.stands_at(value);
+        match (!self.open[0] && below, !self.open[1] && above) {
             (true, _) => Some(self.least),
             (_, true) => Some(self.most),
             _ => None,

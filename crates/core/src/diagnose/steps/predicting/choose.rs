@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::StepResult;
-use crate::diagnose::candidates::{exclude, shape_end};
+use crate::diagnose::candidates::{exclude, is_untold};
 use crate::diagnose::problem::case::DiagnosisCase;
 use crate::diagnose::search::{ChosenCandidate, Field, own_joint};
 use crate::diagnose::watch::DiagnosisWatch;
@@ -30,10 +30,7 @@ pub(super) fn may_predict(
     let by_pose = entry.families.contains(&Family::Position) && !goes_round;
     let of_columns =
         entry.role == Role::Columns && law.formula.is_none() && law.direction.is_none();
-    predicts(&effect.family())
-        && !by_pose
-        && of_columns
-        && shape_end(model, case, cover, effect).is_none()
+    predicts(&effect.family()) && !by_pose && of_columns && !is_untold(model, case, cover, effect)
 }
 
 /// A candidate that passes for a joint.
