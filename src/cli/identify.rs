@@ -204,13 +204,14 @@ impl IdentifyJob {
         let motion_of = |specs: &[LogSpec], beside: Option<&FilteredMotion>| {
             let of = logs_of(specs);
             let parts = LogData::read_all(&setup, &of, &[&data.logs], &context.control);
-            let found = parts.and_then(|parts| {
-                FilteredMotion::of_logs(&setup, &parts, beside, &context.control)
-            });
-            match found {
+            let motion = match parts {
+                Ok(parts) => FilteredMotion::of_logs(&setup, &parts, beside, &context.control),
+                Err(error) => Err(error),
+            };
+            match motion {
                 // the whole log is read by now: what keeps a part from a fit is its place
                 Err(error) if !matches!(error, IdentifyError::Interrupted) => Ok(None),
-                found => Ok(found?),
+                motion => Ok(motion?),
             }
         };
         let logs = held_out::parted(all, &motion_of)?;

@@ -32,13 +32,16 @@ impl Chance {
     }
 }
 
+/// Volts by the time of a test [s].
+type Volts<'a> = &'a dyn Fn(f64) -> f64;
+
 /// Weight of the arm of the four tests \[V\].
 const WEIGHT: f64 = 0.62;
 
 /// Four tests of an arm, as tools for motors of robots in competitions record them: two slow ramps of the voltage and two
 /// steps, 6 s between them, from one stop to the other. V = 0.21 sgn(w) + 0.62 cos(q) + 1.85 w + 0.11 a, at 50 Hz.
 fn four_tests() -> String {
-    let tests: [(&str, &dyn Fn(f64) -> f64, f64); 4] = [
+    let tests: [(&str, Volts, f64); 4] = [
         ("quasistatic-forward", &|t| 0.25 * t, -1.1),
         ("quasistatic-reverse", &|t| -0.25 * t, 1.3),
         ("dynamic-forward", &|_| 3.0, -1.1),

@@ -72,7 +72,13 @@ pub fn payload(
         carried,
         touched,
         with_touched,
-    } = rows_of_load(setup, model, &whole, (name, &names), control)?;
+    } = rows_of_load(
+        setup,
+        (model, &file.held_out),
+        &whole,
+        (name, &names),
+        control,
+    )?;
     let covariance = inertial_covariance(file, model);
     let declared = has_declared_gains(file);
     let common = if declared { GAIN_DEVIATION } else { 0.0 };
@@ -120,8 +126,13 @@ pub(crate) fn carried_in(
     let whole = read_whole(setup, logs, control)?;
     setup.check_temperatures(model, logs, &whole.stretches)?;
     let names: Vec<String> = logs.iter().map(LogData::name).collect();
-    let LoadRows { rows, carried, .. } =
-        rows_of_load(setup, model, &whole, (&given.name, &names), control)?;
+    let LoadRows { rows, carried, .. } = rows_of_load(
+        setup,
+        (model, &file.held_out),
+        &whole,
+        (&given.name, &names),
+        control,
+    )?;
     if carried.is_empty() {
         return Ok(carried);
     }

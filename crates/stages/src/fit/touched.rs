@@ -12,6 +12,7 @@ use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::judge::{GroupError, kept_groups};
 use cft_ident_core::robot::standard::STANDARD;
+use cft_ident_files::config::held_out::HeldOut;
 
 /// Part of a column's square that is added to its diagonal.
 const RIDGE: f64 = 1e-9;
@@ -25,10 +26,11 @@ pub(super) struct LoadRows {
     pub with_touched: Option<Rows>,
 }
 
-/// Filters the rows of logs, and finds out when the body acts and which parts are to be left out.
+/// Filters the rows of logs, and finds out when the body acts and which parts are to be left out: what is off by more than
+/// the model's band, which `held_out` data gave.
 pub(super) fn rows_of_load(
     setup: &RobotSetup,
-    model: &AugmentedModel,
+    (model, held_out): (&AugmentedModel, &[HeldOut]),
     whole: &InMemory,
     (name, logs): (&str, &[String]),
     control: &Control,
@@ -41,13 +43,18 @@ pub(super) fn rows_of_load(
         };
         rows(setup, model, whole, name, parts, control)
     };
+    let touched_in = |rows: &Rows| {
+        let mut spans = touched_spans(rows, logs, setup);
+        spans.retain(|span| is_beyond_band(span, held_out));
+        spans
+    };
     let plain = of(&[], &[])?;
     let mut carried = carried_spans(&plain, logs);
-    let mut touched = touched_spans(&plain, logs, setup);
+    let mut touched = touched_in(&plain);
     let mut all = plain;
     if !carried.is_empty() {
         all = of(&carried, &[])?;
-        let beside = touched_spans(&all, logs, setup);
+        let beside = touched_in(&all);
         if touched.is_empty() || beside.is_empty() {
             // a body that comes and goes explains what looks like a touch
             touched = beside;
@@ -71,6 +78,16 @@ pub(super) fn rows_of_load(
         touched,
         with_touched: Some(all),
     })
+}
+
+/// Whether a joint's torque is off by more than the model's 95 % band is wide anywhere: what the model lacks is no touch.
+fn is_beyond_band(span: &TouchedSpan, held_out: &[HeldOut]) -> bool {
+    let is_off = |off: &TorqueOff| {
+        let of_joint = held_out.iter().find(|held| held.joint == off.joint)?;
+        let widths = of_joint.half_width_95.iter().flatten();
+        Some(off.off > widths.copied().fold(0.0, f64::max))
+    };
+    span.off.iter().any(|off| is_off(off).unwrap_or(false))
 }
 
 /// Sums of the rows of each unit, joint by joint: entries of the body, friction and offset, and what the model leaves.
