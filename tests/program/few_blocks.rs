@@ -188,8 +188,8 @@ fn a_drift_is_no_step() {
 
 #[test]
 fn friction_that_goes_by_less_than_a_wave_and_a_half_of_the_travel_is_named() {
-    // four waves a turn, of which the travel of 2.2 rad covers 1.4
-    let waving = |_, q: f64, v: f64| 0.15 * v.signum() * (4.0 * q + 0.4).sin();
+    // of the waves the travel of 1.56 rad covers 1.4
+    let waving = |_, q: f64, v: f64| 0.15 * v.signum() * (5.65 * q + 0.4).sin();
     let motion = |seed| log(seed, OTHER, &[], &waving);
     let tried = diagnosed(&motion(2), &motion(52));
     assert_eq!(tried.names(), ["position-friction"]);
