@@ -8,7 +8,9 @@ use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
 use cft_ident_report::report::table::{CellAlignment, Table};
-use cft_ident_report::report::{FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline};
+use cft_ident_report::report::{
+    FigureTone, FoundLine, Report, VerdictFigure, VerdictHeadline, torques_off,
+};
 use cft_ident_stages::identify::{
     self, CarriedSpan, Dataset, IntervalNumber, Payload, PayloadReading, PayloadVerdict,
     TouchedSpan,
@@ -221,16 +223,11 @@ fn carried(span: &CarriedSpan) -> String {
 
 /// A part that is left out: when, and what is left there.
 fn touched(span: &TouchedSpan) -> String {
-    let off = span.off.iter().map(|of| {
-        let size = number::significant(of.off, 2);
-        format!("{} by {size} {}", escape(&of.joint), of.unit)
-    });
-    let off: Vec<String> = off.collect();
     let [from, to] = [span.from_s, span.to_s].map(|t| number::significant(t, 4));
     format!(
         "from {from} to {to} s of {} torques are off, {}, far more than in the rest: a touch? It is left out",
         escape(&span.log),
-        off.join(", ")
+        torques_off(&span.off)
     )
 }
 

@@ -7,6 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
+use crate::log_folder::run_line;
+
 const ROBOT: &str = r#"
 [robot]
 model = "single-joint"
@@ -69,16 +71,10 @@ fn log(seed: u64, waves: Waves, slow: &[[f64; 2]], added: Added) -> String {
     text
 }
 
-fn run(folder: &Path, line: &str) -> Value {
-    let output = assert_cmd::Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(line.split_whitespace())
-        .args(["--json", "-"])
-        .output()
-        .unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{line}: {said}"))
+fn document_of(folder: &Path, line: &str) -> Value {
+    let (_, document, said) = run_line(folder, line);
+    assert!(document.is_object(), "{line}: {said}");
+    document
 }
 
 /// What `diagnose` says of a log, what of it is written, and the error on another motion before and after.
@@ -107,8 +103,8 @@ fn diagnosed(fitted: &str, unseen: &str) -> Tried {
     write("robot.toml", ROBOT);
     write("fitted.csv", fitted);
     write("unseen.csv", unseen);
-    run(folder.path(), "lsq fitted.csv -r robot.toml -o before.toml");
-    let document = run(
+    document_of(folder.path(), "lsq fitted.csv -r robot.toml -o before.toml");
+    let document = document_of(
         folder.path(),
         "diagnose fitted.csv -m before.toml -o after.toml",
     );
@@ -116,7 +112,7 @@ fn diagnosed(fitted: &str, unseen: &str) -> Tried {
     let written = steps.filter(|step| step["written"] == true).cloned();
     let written = written.collect();
     let error = |model: &str| {
-        let document = run(folder.path(), &format!("validate unseen.csv -m {model}"));
+        let document = document_of(folder.path(), &format!("validate unseen.csv -m {model}"));
         document["joints"][0]["relative_error_moving"]
             .as_f64()
             .unwrap()

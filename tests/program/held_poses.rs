@@ -1,46 +1,10 @@
 //! What `lsq --static` says of poses that do not belong.
 
 use std::fmt::Write;
-use std::path::Path;
 
-use serde_json::Value;
-
-/// Two joints in a vertical plane.
-const ARM: &str = r#"[robot]
-model = "serial"
-drive_inertia = false
-
-[[robot.link]]
-joint = "a"
-rpy = [1.5707963267948966, 0.0, 0.0]
-
-[[robot.link]]
-joint = "b"
-xyz = [0.4, 0.0, 0.0]
-
-[friction]
-law = "viscous-coulomb"
-fitted_with_inertias = true
-
-[filter]
-cutoff_hz = 8.0
-"#;
+use crate::log_folder::{ARM, run_line};
 
 const MEASURED: &str = "torque_is = \"joint\"";
-
-/// Runs a command in a folder: status, document, and what it says.
-fn run(folder: &Path, line: &str) -> (i32, Value, String) {
-    let output = assert_cmd::Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(line.split_whitespace())
-        .args(["--json", "-"])
-        .output()
-        .unwrap();
-    let document = serde_json::from_slice(&output.stdout).unwrap_or_default();
-    let said = String::from_utf8(output.stderr).unwrap();
-    (output.status.code().unwrap(), document, said)
-}
 
 #[test]
 fn a_held_pose_that_is_touched_is_named_by_the_fit_of_gravity() {
@@ -66,7 +30,7 @@ fn a_held_pose_that_is_touched_is_named_by_the_fit_of_gravity() {
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("poses.csv", &text);
     write("arm.toml", &format!("{ARM}\n[log]\n{MEASURED}\n"));
-    let (code, found, said) = run(
+    let (code, found, said) = run_line(
         folder.path(),
         "lsq --static poses.csv -r arm.toml -o g.toml",
     );

@@ -45,6 +45,7 @@ mod identify;
 mod inspect_faults;
 mod inspect_shared_data;
 mod interrupted;
+mod log_folder;
 #[path = "../../crates/logs/tests/logs/log_support/mod.rs"]
 mod log_support;
 mod log_writing;

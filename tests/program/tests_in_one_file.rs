@@ -2,23 +2,8 @@
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
-use std::path::Path;
 
-use serde_json::Value;
-
-/// Runs a command in a folder: status, document, and what it says.
-fn run_line(folder: &Path, line: &str) -> (i32, Value, String) {
-    let output = assert_cmd::Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(line.split_whitespace())
-        .args(["--json", "-"])
-        .output()
-        .unwrap();
-    let document = serde_json::from_slice(&output.stdout).unwrap_or_default();
-    let said = String::from_utf8(output.stderr).unwrap();
-    (output.status.code().unwrap(), document, said)
-}
+use crate::log_folder::run_line;
 
 /// Numbers of [-0.5, 0.5].
 struct Chance(u64);

@@ -1,32 +1,12 @@
 //! What a log holds beside a measured motion of one robot: torques that a controller computed, a load that comes and goes.
 
 use std::fmt::Write;
-use std::path::Path;
 
 use cft_ident::config::RobotFile;
 use cft_ident::robot::standard::Body;
 use serde_json::Value;
 
-/// Two joints in a vertical plane.
-const ARM: &str = r#"[robot]
-model = "serial"
-drive_inertia = false
-
-[[robot.link]]
-joint = "a"
-rpy = [1.5707963267948966, 0.0, 0.0]
-
-[[robot.link]]
-joint = "b"
-xyz = [0.4, 0.0, 0.0]
-
-[friction]
-law = "viscous-coulomb"
-fitted_with_inertias = true
-
-[filter]
-cutoff_hz = 8.0
-"#;
+use crate::log_folder::{ARM, run_line};
 
 /// What the torques are made of.
 struct Plant {
@@ -143,20 +123,6 @@ fn log(plant: &Plant) -> String {
     text
 }
 
-/// Runs a command in a folder: status, document, and what it says.
-fn run(folder: &Path, line: &str) -> (i32, Value, String) {
-    let output = assert_cmd::Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(line.split_whitespace())
-        .args(["--json", "-"])
-        .output()
-        .unwrap();
-    let document = serde_json::from_slice(&output.stdout).unwrap_or_default();
-    let said = String::from_utf8(output.stderr).unwrap();
-    (output.status.code().unwrap(), document, said)
-}
-
 fn with_log(plant: &Plant, head: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
@@ -168,7 +134,7 @@ fn with_log(plant: &Plant, head: &str) -> tempfile::TempDir {
 /// A folder with the log of an arm and the model `m.toml` of it.
 fn fitted(plant: &Plant) -> tempfile::TempDir {
     let folder = with_log(plant, MEASURED);
-    let (code, _, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml");
+    let (code, _, said) = run_line(folder.path(), "lsq log.csv -r arm.toml -o m.toml");
     assert_eq!(code, 0, "{said}");
     folder
 }
@@ -203,7 +169,7 @@ fn a_torque_that_no_drive_gives_is_doubted_by_data_and_by_name_and_fitted_all_th
         (real(0.8, 0.2), FED_FORWARD, true, true),
     ] {
         let folder = with_log(&plant, head);
-        let (code, found, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
+        let (code, found, said) = run_line(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
         assert_eq!(code, 0, "{said}");
         assert_eq!(said.contains(NO_DRIVE), by_data, "{head}: {said}");
         assert_eq!(said.contains(BY_NAME), by_name, "{head}: {said}");
@@ -217,7 +183,7 @@ fn torques_that_a_program_played_in_logs_of_other_motions_are_no_measurement() {
     let folder = with_log(&plant(0.1), MEASURED);
     let words = "equal to the last digit";
     let lsq = || {
-        run(
+        run_line(
             folder.path(),
             "lsq log.csv other.csv -r arm.toml -o m.toml -v",
         )
@@ -247,7 +213,7 @@ fn the_law_of_a_drive_takes_all_that_it_is_asked_for_and_columns_that_it_leaves_
     let law = |more: &str| {
         let law = format!("torque = {{ pd = [80.0, 3.0], command = \"q_des_{{joint}}\"{more} }}");
         let folder = with_log(&REAL, &law);
-        run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v")
+        run_line(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v")
     };
     let (code, found, said) =
         law(", velocity_command = \"dq_des_{joint}\", feed_forward = [\"tau_ff_a\", \"tau_ff_b\"]");
@@ -279,13 +245,13 @@ fn a_feed_forward_that_is_0_throughout_raises_no_doubt_named_or_not() {
     for more in [speed.to_owned(), format!("{speed}{named}")] {
         let law = format!("torque = {{ pd = [80.0, 3.0], command = \"q_des_{{joint}}\"{more} }}");
         let folder = with_log(&plant, &law);
-        let (code, found, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
+        let (code, found, said) = run_line(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
         assert_eq!(code, 0, "{said}");
         let viscous = value(&found, "viscous", "a");
         assert!((viscous - 0.4).abs() < 0.05, "{viscous}");
         assert!(!said.contains("feed_forward"), "{said}");
         assert!(!said.contains("tau_ff"), "{said}");
-        let (code, found, said) = run(folder.path(), "inspect log.csv -r arm.toml -v");
+        let (code, found, said) = run_line(folder.path(), "inspect log.csv -r arm.toml -v");
         assert_eq!(code, 0, "{said}");
         let faults = found["faults"].as_array().unwrap();
         assert!(faults.is_empty(), "{faults:?}");
@@ -301,7 +267,7 @@ fn a_feed_forward_that_is_0_throughout_raises_no_doubt_named_or_not() {
     };
     let text: Vec<String> = text.lines().map(last).collect();
     std::fs::write(&path, text.join("\n")).unwrap();
-    let (code, _, said) = run(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
+    let (code, _, said) = run_line(folder.path(), "lsq log.csv -r arm.toml -o m.toml -v");
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("tau_ff_a, tau_ff_b"), "{said}");
 }
@@ -316,7 +282,7 @@ fn a_load_that_is_carried_to_the_end_has_no_end_though_the_arm_rests_there() {
     let folder = fitted(&plant((0.0, [0.0; 2])));
     let path = folder.path();
     std::fs::write(path.join("loaded.csv"), log(&plant((0.8, [9.0, 99.0])))).unwrap();
-    let (code, found, said) = run(path, "payload loaded.csv -m m.toml");
+    let (code, found, said) = run_line(path, "payload loaded.csv -m m.toml");
     assert_eq!(code, 0, "{said}");
     let spans = found["carried"].as_array().unwrap();
     let [span] = spans.as_slice() else {
@@ -341,7 +307,7 @@ fn a_load_that_comes_and_goes_within_a_log_is_found_with_its_times() {
         ((0.0, [0.0; 2]), None, None),
     ] {
         std::fs::write(path.join("loaded.csv"), log(&plant(load))).unwrap();
-        let (code, found, said) = run(path, "payload loaded.csv -m m.toml");
+        let (code, found, said) = run_line(path, "payload loaded.csv -m m.toml");
         assert_eq!(code, 0, "{said}");
         let spans = found["carried"].as_array().unwrap();
         let near = |x: &Value, t: Option<f64>| match t {
@@ -383,7 +349,7 @@ fn a_part_in_which_somebody_leans_on_the_arm_is_no_part_of_its_load() {
             ..REAL
         };
         std::fs::write(path.join("loaded.csv"), log(&plant)).unwrap();
-        let (code, found, said) = run(path, "payload loaded.csv -m m.toml");
+        let (code, found, said) = run_line(path, "payload loaded.csv -m m.toml");
         assert_eq!(code, 0, "{said}");
         let spans = found["touched"].as_array().unwrap();
         assert_eq!(
@@ -425,7 +391,8 @@ fn a_load_that_is_picked_up_is_no_course_over_time_to_a_diagnosis() {
         ((0.0, [0.0; 2]), None),
     ] {
         std::fs::write(path.join("loaded.csv"), log(&plant(load))).unwrap();
-        let (code, found, said) = run(path, "diagnose loaded.csv -m m.toml --keep -o d.toml -v");
+        let (code, found, said) =
+            run_line(path, "diagnose loaded.csv -m m.toml --keep -o d.toml -v");
         assert_eq!(code, 0, "{said}");
         assert_eq!(said.contains(words), from.is_some(), "{said}");
         assert!(from.is_none_or(|from| said.contains(from)), "{said}");
@@ -448,7 +415,7 @@ fn what_is_held_out_is_a_part_that_the_filter_can_use() {
     };
     let text: Vec<&str> = whole.lines().filter(kept).collect();
     std::fs::write(&path, text.join("\n")).unwrap();
-    let (code, _, said) = run(folder.path(), "identify log.csv arm.toml -o run");
+    let (code, _, said) = run_line(folder.path(), "identify log.csv arm.toml -o run");
     assert_eq!(code, 0, "{said}");
     let result = std::fs::read_to_string(folder.path().join("run/result.json")).unwrap();
     let result: Value = serde_json::from_str(&result).unwrap();
@@ -467,9 +434,9 @@ fn the_smallest_force_that_shows_is_one_number_in_show_and_in_watch() {
         }),
     )
     .unwrap();
-    let (code, shown, said) = run(path, "show m.toml");
+    let (code, shown, said) = run_line(path, "show m.toml");
     assert_eq!(code, 0, "{said}");
-    let (code, watched, said) = run(path, "watch other.csv -m m.toml");
+    let (code, watched, said) = run_line(path, "watch other.csv -m m.toml");
     assert_eq!(code, 0, "{said}");
     let forces = |all: &Value, key: &str| -> Vec<Option<f64>> {
         let all = all.as_array().unwrap().iter();
@@ -486,7 +453,7 @@ fn the_smallest_force_that_shows_is_one_number_in_show_and_in_watch() {
     let observed = watched["calibrated_s"].as_f64().unwrap();
     assert!((proven * observed / 3600.0 - 3.0).abs() < 1e-9 && observed < 24.0);
     assert!(said.contains("prove"), "{said}");
-    let (_, hourly, said) = run(path, "watch other.csv -m m.toml --false-alarms 600");
+    let (_, hourly, said) = run_line(path, "watch other.csv -m m.toml --false-alarms 600");
     assert_eq!(hourly["proven_per_hour"].as_f64(), Some(600.0));
     assert!(!said.contains("prove"), "{said}");
 }

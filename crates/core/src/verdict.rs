@@ -1,4 +1,4 @@
-//! What the data say about a parameter.
+//! What the data say about a parameter, and about a torque.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -45,4 +45,13 @@ pub fn verdict_of(value: f64, std: f64) -> Verdict {
     } else {
         Verdict::NotIdentifiable
     }
+}
+
+/// What is left of a joint's torque where something else acts on the arm.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TorqueOff {
+    pub joint: String,
+    /// Root mean square of what is left, by what the rest tells \[unit\].
+    pub off: f64,
+    pub unit: String,
 }

@@ -48,7 +48,7 @@ pub use crate::fit::motion_fit::MotionFit;
 pub use crate::fit::payload::payload;
 pub use crate::fit::payload_result::{
     CarriedSpan, GainOff, IntervalNumber, LeftOfJoint, Payload, PayloadReading, PayloadVerdict,
-    TorqueOff, TouchedSpan,
+    TouchedSpan,
 };
 pub use crate::fit::weakest::WeakestPart;
 pub use crate::fleet::reduce::reduce;

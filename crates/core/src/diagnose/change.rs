@@ -14,29 +14,28 @@ use crate::judge::{BlocksLeftOut, ErrorGain, Term};
 /// Standard errors from which on a change is reported: there are as many places as blocks and joints.
 const REPORTED: f64 = 3.0;
 
-/// Terms of a joint that are there from a block of a log on, until the log's end: another log is another day.
+/// What terms of a joint gain that are there from a block of a log on, until the log's end: another log is another day.
 struct LateTerms {
-    terms: Vec<Term>,
     within: Range<usize>,
     gain: ErrorGain,
 }
 
+/// The terms of what of a joint's torque may change.
+fn changing_terms(field: &Field, joint: usize, of: ChangedTorque) -> Vec<Term> {
+    let is_own = |unknown: &Unknown| match (of, *unknown) {
+        (ChangedTorque::Friction, Unknown::Friction { joint: j, k }) => j == joint && k < 2,
+        (ChangedTorque::Offset, Unknown::Offset(j)) => j == joint,
+        _ => false,
+    };
+    let declared = field.prepared.unknowns.list.iter();
+    let declared = declared.zip(&field.summed.declared.list);
+    let own = declared.filter(|(unknown, _)| is_own(unknown));
+    own.map(|(_, term)| term.clone()).collect()
+}
+
 impl LateTerms {
     /// Of each log the begin that gains most.
-    fn of_logs(
-        field: &Field,
-        left_out: &BlocksLeftOut,
-        (joint, of): (usize, ChangedTorque),
-    ) -> Vec<Self> {
-        let is_own = |unknown: &Unknown| match (of, *unknown) {
-            (ChangedTorque::Friction, Unknown::Friction { joint: j, k }) => j == joint && k < 2,
-            (ChangedTorque::Offset, Unknown::Offset(j)) => j == joint,
-            _ => false,
-        };
-        let declared = field.prepared.unknowns.list.iter();
-        let declared = declared.zip(&field.summed.declared.list);
-        let own = declared.filter(|(unknown, _)| is_own(unknown));
-        let terms: Vec<Term> = own.map(|(_, term)| term.clone()).collect();
+    fn of_logs(field: &Field, left_out: &BlocksLeftOut, terms: &[Term]) -> Vec<Self> {
         if terms.is_empty() {
             return Vec::new();
         }
@@ -49,8 +48,7 @@ impl LateTerms {
         let best = |log: Range<usize>| {
             let begins = (log.start + 1..log.end).map(|b| b..log.end);
             let late = begins.map(|within| LateTerms {
-                gain: left_out.gain_within(&terms, within.clone()),
-                terms: terms.clone(),
+                gain: left_out.gain_within(terms, within.clone()),
                 within,
             });
             late.max_by(|a, b| a.gain.value.total_cmp(&b.gain.value))
@@ -76,7 +74,8 @@ pub fn torque_changes(field: &Field, chosen: &[ChosenCandidate]) -> Vec<TorqueCh
     let of_joint = |j: usize| {
         let kinds = [ChangedTorque::Friction, ChangedTorque::Offset].into_iter();
         let all = kinds.flat_map(|of| {
-            let late = LateTerms::of_logs(field, &left_out, (j, of)).into_iter();
+            let late = LateTerms::of_logs(field, &left_out, &changing_terms(field, j, of));
+            let late = late.into_iter();
             late.map(move |late| (of, late))
         });
         let (of, late) = all.max_by(|a, b| a.1.gain.value.total_cmp(&b.1.gain.value))?;
@@ -85,7 +84,8 @@ pub fn torque_changes(field: &Field, chosen: &[ChosenCandidate]) -> Vec<TorqueCh
         if !late.is_sure(j) || error - late.gain.joints[j][0] > left {
             return None;
         }
-        let amplitude = left_out.amplitude_within(&late.terms, late.within.clone());
+        let amplitude =
+            left_out.amplitude_within(&changing_terms(field, j, of), late.within.clone());
         let by = match of {
             ChangedTorque::Offset => amplitude[0],
             ChangedTorque::Friction => {
@@ -113,7 +113,8 @@ pub fn torque_changes(field: &Field, chosen: &[ChosenCandidate]) -> Vec<TorqueCh
 /// seen there is a step of the channel, and no drift.
 pub fn stepped_joints(field: &Field, left_out: &BlocksLeftOut) -> Vec<usize> {
     let is_stepped = |j: &usize| {
-        let steps = LateTerms::of_logs(field, left_out, (*j, ChangedTorque::Offset)).into_iter();
+        let offset = changing_terms(field, *j, ChangedTorque::Offset);
+        let steps = LateTerms::of_logs(field, left_out, &offset).into_iter();
         let sure = steps.filter(|late| late.is_sure(*j));
         let by_steps: f64 = sure.map(|late| late.gain.value).sum();
         let slow = (0..field.candidates.len()).filter(|c| {

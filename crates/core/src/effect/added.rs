@@ -112,9 +112,9 @@ impl ModelEffect {
         (values, keys.iter().map(of).collect())
     }
 
-    /// Holds the shape of an effect of which no size is so many deviations off zero while its shape is free: the two trade
-    /// with each other, and the torque is told by the sizes beside this shape. Gives the covariance of (shape, linear) beside
-    /// it, row-major, of that with the shape free; none where the shape stays free.
+    /// Holds the shape where no size is so many deviations off zero while it is free: sizes and shape trade with each other.
+    /// Gives the covariance of (shape, linear) with the shape held, row-major, by that with the shape free; none where the
+    /// shape stays free.
     pub(crate) fn hold_shape_beside_untold_sizes(
         &mut self,
         covariance: &[f64],

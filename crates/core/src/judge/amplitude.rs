@@ -186,7 +186,8 @@ impl JointFit {
         let not_chance = known + part * part;
         let changes: Vec<f64> = without.iter().map(|x| x.dot(&pull) / size - 1.0).collect();
         let readings = ChanceReading::both(&changes, &self.leverages(&free, &amplitude), numbers);
-        let surest = readings.into_iter().filter_map(|reading| {
+        let scatter = readings.as_ref().map_or(0.0, |[plain, _]| plain.variance);
+        let surest = readings.into_iter().flatten().filter_map(|reading| {
             let f = 1.0 / ((reading.variance + not_chance) * k as f64);
             let floor = floor(k, reading.blocks, numbers).map(|floor| floor / reading.wide)?;
             Some((f, floor, reading))
@@ -207,7 +208,7 @@ impl JointFit {
             out.torque = [rms, rms * variance.sqrt()];
         }
         if let Some((f, floor, reading)) = surest {
-            out.over_covariance = (reading.variance + not_chance) / (reading.scatter + known);
+            out.over_covariance = (reading.variance + not_chance) / (scatter + known);
             (out.f, out.blocks) = (f, reading.blocks);
             out.floor = (self.blocks.len() >= numbers.least_blocks).then_some(floor);
         }

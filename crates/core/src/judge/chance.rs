@@ -15,8 +15,6 @@ const HALVINGS: usize = 60;
 pub(super) struct ChanceReading {
     /// Square of the relative deviation.
     pub variance: f64,
-    /// The same by the scatter of fits without each block.
-    pub scatter: f64,
     /// Number of blocks of equal information that would tell the variance as surely.
     pub blocks: f64,
     /// How much wider than the truth the variance comes out.
@@ -26,15 +24,12 @@ pub(super) struct ChanceReading {
 impl ChanceReading {
     /// By the scatter of fits without each block, whose relative `changes` these are; and moderated by the noise that
     /// all blocks tell, which tells an effect of few blocks from chance (Smyth 2004).
-    pub fn both(changes: &[f64], leverages: &[f64], numbers: &Numbers) -> Vec<Self> {
-        let Some((blocks, wide)) = freedom(leverages) else {
-            return Vec::new();
-        };
+    pub fn both(changes: &[f64], leverages: &[f64], numbers: &Numbers) -> Option<[Self; 2]> {
+        let (blocks, wide) = freedom(leverages)?;
         let n = changes.len() as f64;
         let scatter = changes.iter().map(|x| x * x).sum::<f64>() * (n - 1.0) / n;
         let plain = ChanceReading {
             variance: scatter,
-            scatter,
             blocks,
             wide,
         };
@@ -45,12 +40,11 @@ impl ChanceReading {
         let alike = telling.map(|(x, h)| x * x * (1.0 - h) / h).sum::<f64>() / count.max(1.0);
         let (shared, own) = (numbers.shared_noise, blocks - 1.0);
         let moderated = ChanceReading {
-            scatter,
             variance: (shared * alike + own * scatter / wide) / (shared + own),
             blocks: (blocks + shared).min(n),
             wide: 1.0,
         };
-        vec![plain, moderated]
+        Some([plain, moderated])
     }
 }
 
@@ -87,10 +81,19 @@ pub fn floor(k: usize, n: f64, numbers: &Numbers) -> Option<f64> {
     if n < 2.0 {
         return None;
     }
-    let (mut low, mut high) = (0.0_f64, 1e9_f64);
-    for _ in 0..HALVINGS {
-        let middle = (low.max(1e-9) * high).sqrt();
-        match chance(k, n - 1.0, middle)? > rare {
+    exceeded_as_rarely(rare, ([1e-9, 1e9], HALVINGS), |f| chance(k, n - 1.0, f))
+}
+
+/// The value between two others that `chance` exceeds as rarely, by so many halves of the logarithm; none where the chance
+/// of one is not known.
+pub(super) fn exceeded_as_rarely(
+    rare: f64,
+    ([mut low, mut high], halvings): ([f64; 2], usize),
+    chance: impl Fn(f64) -> Option<f64>,
+) -> Option<f64> {
+    for _ in 0..halvings {
+        let middle = (low * high).sqrt();
+        match chance(middle)? > rare {
             true => low = middle,
             false => high = middle,
         }

@@ -3,6 +3,7 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Blocks;
+use super::chance::exceeded_as_rarely;
 
 /// The numbers that decide whether parts of the logs agree on a hypothesis of the set-up.
 #[derive(Debug, Clone, Copy)]
@@ -75,19 +76,11 @@ fn doubt(parts: usize) -> Option<f64> {
         Some(distribution.sf(parts * z))
     };
     let usual = chance(PARTS.parts, PARTS.doubt)?;
-    let (mut low, mut high) = (PARTS.doubt, MOST_DOUBT);
-    if parts < LEAST_PARTS || chance(parts, high)? > usual {
+    if parts < LEAST_PARTS || chance(parts, MOST_DOUBT)? > usual {
         return None;
     }
-    // halves of the logarithm: to a thousandth after thirty
-    for _ in 0..30 {
-        let middle = (low * high).sqrt();
-        match chance(parts, middle)? > usual {
-            true => low = middle,
-            false => high = middle,
-        }
-    }
-    Some(high)
+    // to a thousandth after thirty
+    exceeded_as_rarely(usual, ([PARTS.doubt, MOST_DOUBT], 30), |z| chance(parts, z))
 }
 
 #[cfg(test)]

@@ -127,7 +127,7 @@ fn copies(judge: &LogJudge, draft: &mut FaultList) {
         };
         let copied = FaultKind::CopiedChannel;
         use ChannelRole::{Command, Position, Torque, Velocity};
-        let mut moves_both = String::new();
+        let with_mimic;
         let (severity, kind, of, effect, remedy) = match (a, b) {
             (Command, Command) => continue,
             (Command, _) | (_, Command) => {
@@ -144,19 +144,16 @@ fn copies(judge: &LogJudge, draft: &mut FaultList) {
             (Position, Position) | (Torque, Torque) => {
                 let effect = equals(first)
                     + ": one of the two is not what it says, and the data of a joint are missing";
-                let remedy = "check the columns of the recorder; name the right ones in the [log] section of the robot file";
+                let mut remedy = "check the columns of the recorder; name the right ones in the [log] section of the robot file";
                 let joints =
                     [first, second].map(|track| track.channel.joint.as_deref().map(escape));
                 if let (Position, [Some(leads), Some(follows)]) = (a, joints) {
                     let times = if copy.opposite { -1 } else { 1 };
-                    moves_both = format!(
+                    with_mimic = format!(
                         "{remedy}; where one drive moves both, `<mimic joint=\"{leads}\" multiplier=\"{times}\"/>` in joint {follows} of the URDF, and the robot file by `cft-ident new` again"
                     );
+                    remedy = &with_mimic;
                 }
-                let remedy = match moves_both.is_empty() {
-                    true => remedy,
-                    false => moves_both.as_str(),
-                };
                 (Error, copied, second, effect, remedy)
             }
             (Position, Velocity) | (Velocity, Position) => {

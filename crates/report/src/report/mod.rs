@@ -22,3 +22,4 @@ pub use value::{
     FigureTone, FoundLine, Report, ReportDetail, TerminalScreen, VerdictFigure, VerdictHeadline,
     Writer,
 };
+pub use words::torques_off;

@@ -3,6 +3,7 @@
 use std::borrow::Borrow;
 
 use cft_ident_core::number;
+use cft_ident_core::verdict::TorqueOff;
 use cft_ident_logs::log::escape;
 
 /// Words in a row, with commas between them.
@@ -14,6 +15,14 @@ pub(super) fn listed<S: Borrow<str>>(words: impl IntoIterator<Item = S>) -> Stri
 /// Names of logs as a report may show them.
 pub(super) fn escaped(names: &[String]) -> String {
     listed(names.iter().map(|name| escape(name)))
+}
+
+/// How far the torques of joints are off: `q1 by 2.4 Nm, q2 by 0.90 Nm`.
+pub fn torques_off(off: &[TorqueOff]) -> String {
+    listed(off.iter().map(|of| {
+        let size = number::significant(of.off, 2);
+        format!("{} by {size} {}", escape(&of.joint), of.unit)
+    }))
 }
 
 /// Name of a parameter, with its joint.

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::note::StageNote;
 use cft_ident_core::robot::standard::{Body, STANDARD};
+use cft_ident_core::verdict::TorqueOff;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::model_file::{EffectParameter, EffectSection};
 use cft_ident_logs::log::Provenance;
@@ -44,15 +45,6 @@ impl CarriedSpan {
         let near = (t - from).abs() < room || (t - to).abs() < room;
         (from <= t && t < to, near)
     }
-}
-
-/// A torque that no body on the last link explains.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct TorqueOff {
-    pub joint: String,
-    /// Root mean square of what is left of it \[unit\].
-    pub off: f64,
-    pub unit: String,
 }
 
 /// A part of a log in which something else acts on the arm than in the rest.

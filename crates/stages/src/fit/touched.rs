@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::carried::{DividedRows, carried_spans};
-use super::payload_result::{CarriedSpan, TorqueOff, TouchedSpan};
+use super::payload_result::{CarriedSpan, TouchedSpan};
 use super::payload_rows::{LEFT, LoadParts, OWN, Rows, places, rows};
 use crate::input::control::Control;
 use crate::input::error::IdentifyError;
@@ -12,6 +12,7 @@ use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::judge::{GroupError, kept_groups};
 use cft_ident_core::robot::standard::STANDARD;
+use cft_ident_core::verdict::TorqueOff;
 use cft_ident_files::config::held_out::HeldOut;
 
 /// Part of a column's square that is added to its diagonal.

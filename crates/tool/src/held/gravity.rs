@@ -11,7 +11,7 @@ use super::holds::HeldLog;
 use super::problem::{HeldProblem, blocks, of_joint, rms};
 use cft_ident_core::judge::{jackknife, width_95};
 use cft_ident_core::number;
-use cft_ident_core::verdict::{Verdict, verdict_of};
+use cft_ident_core::verdict::{TorqueOff, Verdict, verdict_of};
 use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::escape;
 
@@ -49,15 +49,6 @@ pub struct JointAtRest {
     pub left_held_out: f64,
 }
 
-/// A torque that is not that of the other poses.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct PoseTorqueOff {
-    pub joint: String,
-    /// What is left of it by the other poses.
-    pub off: f64,
-    pub unit: String,
-}
-
 /// A pose in which something else acts on the arm.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TouchedPose {
@@ -65,7 +56,7 @@ pub struct TouchedPose {
     pub pose: usize,
     /// When it began \[s\].
     pub t: f64,
-    pub off: Vec<PoseTorqueOff>,
+    pub off: Vec<TorqueOff>,
 }
 
 /// Gravity of an arm.
@@ -116,7 +107,7 @@ pub fn fit_gravity(log: &HeldLog, file: &RobotFile, name: &str) -> Result<Gravit
         pose: log.poses[k].number,
         t: log.poses[k].t,
         off: (problem.residual(&(k..k + 1), &x).into_iter())
-            .map(|(j, off)| PoseTorqueOff {
+            .map(|(j, off)| TorqueOff {
                 joint: names[j].clone(),
                 off,
                 unit: file.torque_unit(j).to_owned(),
@@ -217,8 +208,8 @@ fn fit_to_all(log: &HeldLog, file: &RobotFile, name: &str) -> Result<GravityFit,
                     .unwrap_or_else(|| open("stiction", &unit)),
                 offset: found(u.offset[j], "offset", &unit, "constant torque"),
                 gain,
-                from_below: log.hold_reached_from(j, 1.0),
-                from_above: log.hold_reached_from(j, -1.0),
+                from_below: log.count_poses_from_side(j, 1.0),
+                from_above: log.count_poses_from_side(j, -1.0),
                 torque,
                 left,
                 left_held_out,

@@ -37,7 +37,7 @@ pub struct HeldLog {
 
 impl HeldLog {
     /// Poses that joint `j` reached from a side.
-    pub(super) fn hold_reached_from(&self, j: usize, side: f64) -> usize {
+    pub(super) fn count_poses_from_side(&self, j: usize, side: f64) -> usize {
         let poses = self.poses.iter();
         poses.filter(|pose| pose.side[j] == side).count()
     }

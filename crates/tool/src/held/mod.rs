@@ -18,9 +18,7 @@ mod python;
 
 pub use check::HoldCheck;
 pub use error::HeldError;
-pub use gravity::{
-    GravityFit, GravityNumber, JointAtRest, PoseTorqueOff, TouchedPose, fit_gravity,
-};
+pub use gravity::{GravityFit, GravityNumber, JointAtRest, TouchedPose, fit_gravity};
 pub use holds::{HeldLog, HeldPose, read_held};
 pub use python::gravity_in_python;
 

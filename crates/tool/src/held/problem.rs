@@ -110,7 +110,7 @@ impl HeldProblem {
             len += 1;
             Some(len - 1)
         };
-        let side = |j: usize, s: f64| log.hold_reached_from(j, s);
+        let side = |j: usize, s: f64| log.count_poses_from_side(j, s);
         // two of each side: one alone is an offset
         let both = |j: usize| side(j, 1.0) > 1 && side(j, -1.0) > 1;
         let stiction: Vec<Option<usize>> = (0..n)

@@ -2,6 +2,7 @@
 
 use crate::report::Report;
 use crate::report::table::{CellAlignment, Table};
+use crate::report::words::torques_off;
 use cft_ident_core::number;
 use cft_ident_core::verdict::Verdict;
 use cft_ident_logs::log::escape;
@@ -84,15 +85,10 @@ fn touched_in_words(pose: &TouchedPose, rows_are_poses: bool) -> String {
         true => String::new(),
         false => format!(", at {} s,", number::significant(pose.t, 4)),
     };
-    let off = pose.off.iter().map(|of| {
-        let size = number::significant(of.off, 2);
-        format!("{} by {size} {}", escape(&of.joint), of.unit)
-    });
-    let off: Vec<String> = off.collect();
     format!(
         "pose {}{when} is off: {}; a touch? It is left out",
         pose.pose,
-        off.join(", ")
+        torques_off(&pose.off)
     )
 }
 
