@@ -109,6 +109,8 @@ impl ObserverRecipe {
             .replace("@WAIT@", &(self.smooth.settle + size).to_string())
             .replace("@FIRST@", &size.max(1).to_string())
             .replace("@STEP@", &exact(self.step_s))
+            .replace("@REACH@", &exact(self.reach_s))
+            .replace("@TINY@", &exact(f64::MIN_POSITIVE))
             .replace("@DELAY_S@", &number::significant(self.delay_s, 4))
             .replace("@RATE@", &number::significant(self.per_hour, 4))
     }
@@ -180,6 +182,7 @@ impl ObserverRecipe {
         out += &language.numbers("EDGES", &[n, edges], limits);
         let std = of().flat_map(|j| padded(&j.std, edges + 1, 0.0));
         out += &language.numbers("STD", &[n, edges + 1], std);
+        out += &language.numbers("COULOMB", &[n], of().map(|j| j.coulomb));
         out += &language.numbers("BAND", &[n], of().map(|j| j.band));
         out += &language.numbers("LIMIT", &[n], of().map(|j| j.limit));
         if let Some(late) = &self.late {

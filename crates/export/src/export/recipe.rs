@@ -35,6 +35,8 @@ pub struct UntouchedTorques {
     pub band: f64,
     /// The threshold of alarms, in deviations.
     pub limit: f64,
+    /// Friction near a standstill is any torque up to this [N or Nm]; 0 of a law that does not jump there.
+    pub coulomb: f64,
 }
 
 /// Parameters whose torque is one deviation of the model's.
@@ -63,10 +65,12 @@ pub struct ObserverRecipe {
     pub per_hour: f64,
     /// Of positions and torques; `settle` counts the rows before the first sample.
     pub position: FilterCascade,
-    /// Of external torques and speeds.
+    /// Of external torques, speeds and doubts of friction.
     pub smooth: FilterCascade,
     pub late: Option<DelayRecipe>,
     pub joints: Vec<UntouchedTorques>,
+    /// Response of the position filter, within which the speed near a standstill is not known \[s\].
+    pub reach_s: f64,
     /// Deviations of the model's torque by its parameters.
     pub uncertain: Vec<ParameterDeviation>,
 }

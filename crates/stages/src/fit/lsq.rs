@@ -27,10 +27,7 @@ pub fn lsq(
     control: &Control,
 ) -> Result<IdentifiedDynamics, IdentifyError> {
     let problem = LsqProblem::new(data, settings)?;
-    let smoothing = choose_smoothing(data, &problem.columns.known_laws(), control)?;
-    let mut rows = LsqRows::new(data, smoothing, control);
-    let estimate = problem.estimate(&mut rows)?;
-    let judged = JudgedEstimate::new(&problem, &rows, estimate)?;
+    let (rows, judged) = fit(&problem, control)?;
     let bridged = moved_by_bridges(&problem, &judged, control)?;
     let notes = lsq_notes(&problem, &rows, &judged, bridged)?;
     let mut found = IdentifiedDynamics::new(&problem, &rows, judged, notes)?;
@@ -49,4 +46,28 @@ pub fn lsq(
         by_motion(data, &mut found, window, control)?;
     }
     Ok(found)
+}
+
+/// Fits the same parameters and says nothing of them: no notes, no errors, no data set aside.
+pub(crate) fn lsq_parameters(
+    data: &Dataset,
+    settings: &LsqSettings,
+    control: &Control,
+) -> Result<IdentifiedDynamics, IdentifyError> {
+    let problem = LsqProblem::new(data, settings)?;
+    let (rows, judged) = fit(&problem, control)?;
+    IdentifiedDynamics::new(&problem, &rows, judged, Vec::new())
+}
+
+/// Reads the rows and solves for the unknowns.
+fn fit<'a>(
+    problem: &LsqProblem<'a>,
+    control: &'a Control,
+) -> Result<(LsqRows<'a>, JudgedEstimate), IdentifyError> {
+    let data = problem.data;
+    let smoothing = choose_smoothing(data, &problem.columns.known_laws(), control)?;
+    let mut rows = LsqRows::new(data, smoothing, control);
+    let estimate = problem.estimate(&mut rows)?;
+    let judged = JudgedEstimate::new(problem, &rows, estimate)?;
+    Ok((rows, judged))
 }

@@ -2,7 +2,7 @@
 //! the effects taken off. With no effect it gives back the given model.
 
 use super::consistent::project_by;
-use super::lsq::lsq;
+use super::lsq::lsq_parameters;
 use super::lsq_problem::LsqSettings;
 use crate::input::control::Control;
 use crate::input::dataset::{Dataset, GivenModel};
@@ -98,7 +98,7 @@ impl OwnRefit<'_> {
             ..LsqSettings::default()
         };
         let data = Dataset::new(self.setup, &self.logs_without(model));
-        let found = lsq(&data, &settings, &self.control.quiet())?;
+        let found = lsq_parameters(&data, &settings, &self.control.quiet())?;
         Ok(found.model(self.setup, own.friction.as_ref().map(|given| &given.file)))
     }
 

@@ -393,6 +393,7 @@ impl Watched {
             self.next = o.t + every * (1.0 - 1e-6);
             variance.resize(o.q.len(), 0.0);
             self.uncertain.variances([o.q, o.v, o.a], &mut variance);
+            (variance.iter_mut().zip(o.variance)).for_each(|(all, own)| *all += own);
             push(QuietSample {
                 t: o.t,
                 begins: std::mem::take(&mut self.begins),

@@ -5,6 +5,7 @@ use cft_ident_core::effect::{AugmentedModel, SampledModel};
 use cft_ident_core::math::causal::{CausalSections, delay_samples};
 use cft_ident_core::math::sos::SosFilter;
 use cft_ident_core::motion::{CausalMotion, FilterSettings, MotionError, MotionSample};
+use cft_ident_core::robot::model::JointFriction;
 use cft_ident_logs::log::{Block, JointTemperatures};
 
 /// Order of the last low-pass.
@@ -23,7 +24,8 @@ pub struct ExternalTorques<'a> {
     pub external: &'a [f64],
     /// Moduli of the speeds behind the same filter [m/s or rad/s].
     pub speed: &'a [f64],
-    /// Variance of the model's torque by its parameters, as far as the observer knows of it \[N^2 or Nm^2\].
+    /// Variance of the model's torque by its parameters, as far as the observer knows of it, and by friction near a
+    /// standstill \[N^2 or Nm^2\].
     pub variance: &'a [f64],
     pub q: &'a [f64],
     pub v: &'a [f64],
@@ -32,12 +34,40 @@ pub struct ExternalTorques<'a> {
     pub begins: bool,
 }
 
+/// How far friction may be from its law near a standstill: there it is any torque up to its Coulomb level.
+#[derive(Debug, Clone)]
+pub(super) struct StandstillDoubt {
+    /// Coulomb level of each joint whose law jumps at rest [N or Nm]; 0 of others.
+    pub levels: Vec<f64>,
+    /// Response of the position filter, within which the speed near a standstill is not known \[s\].
+    pub reach_s: f64,
+}
+
+impl StandstillDoubt {
+    /// Of a model behind a position filter at a sampling step \[s\].
+    pub fn of(model: &AugmentedModel, settings: &FilterSettings, step_s: f64) -> Self {
+        let level = |law: &JointFriction| law.coulomb().filter(|_| law.jumps());
+        let laws = model.model.friction.iter();
+        StandstillDoubt {
+            levels: laws.map(|law| level(law).unwrap_or(0.0).abs()).collect(),
+            reach_s: 1.0 / settings.plain_q_cutoff_hz(1.0 / step_s),
+        }
+    }
+
+    /// All of the level where joint `j` stands, and none of it from so far on that it stood or will stand beyond the
+    /// filter's response [N or Nm].
+    fn at(&self, j: usize, v: f64, a: f64) -> f64 {
+        let within = self.reach_s * a.abs() + f64::MIN_POSITIVE;
+        self.levels[j] * (1.0 - v.abs() / within).max(0.0)
+    }
+}
+
 /// Observes one log or stream.
 pub struct Observer {
     motion: CausalMotion,
     model: AugmentedModel,
     uncertain: Option<Directions>,
-    cutoff_hz: f64,
+    settings: FilterSettings,
     core: Option<ObserverCore>,
     first: Option<f64>,
     temperatures: JointTemperatures,
@@ -49,10 +79,11 @@ struct ObserverCore {
     settle: usize,
     delay_s: f64,
     late: Option<TorqueDelay>,
+    doubt: StandstillDoubt,
     /// Samples since the stretch began.
     count: usize,
     tau: Vec<f64>,
-    /// External torques, then speeds.
+    /// External torques, then speeds, then doubts of friction.
     row: Vec<f64>,
     variance: Vec<f64>,
 }
@@ -76,7 +107,7 @@ impl Observer {
             motion: CausalMotion::new(model.model.robot.joints(), settings)?,
             model,
             uncertain: None,
-            cutoff_hz: settings.cutoff_hz,
+            settings: settings.clone(),
             core: None,
             first: None,
             temperatures: JointTemperatures::default(),
@@ -117,7 +148,7 @@ impl Observer {
     ) -> Result<(), MotionError> {
         self.first = self.first.or(rows.t.first().copied());
         let first = self.first.unwrap_or(0.0);
-        let (core, model, cutoff) = (&mut self.core, &self.model, self.cutoff_hz);
+        let (core, model, settings) = (&mut self.core, &self.model, &self.settings);
         let (uncertain, temperatures) = (&mut self.uncertain, &self.temperatures);
         let mut failed = None;
         self.motion.push(rows, last, &mut |dt, sample| {
@@ -125,7 +156,7 @@ impl Observer {
                 return;
             }
             if core.is_none() {
-                match ObserverCore::design(model, cutoff, dt) {
+                match ObserverCore::design(model, settings, dt) {
                     Ok(designed) => *core = Some(designed),
                     Err(error) => failed = Some(error),
                 }
@@ -141,20 +172,25 @@ impl Observer {
 }
 
 impl ObserverCore {
-    fn design(model: &AugmentedModel, cutoff_hz: f64, dt: f64) -> Result<Self, MotionError> {
+    fn design(
+        model: &AugmentedModel,
+        settings: &FilterSettings,
+        dt: f64,
+    ) -> Result<Self, MotionError> {
         let n = model.model.robot.joints();
-        let sos = SosFilter::butterworth(ORDER, cutoff_hz, 1.0 / dt)?;
+        let sos = SosFilter::butterworth(ORDER, settings.cutoff_hz, 1.0 / dt)?;
         let late = TorqueDelay::of(model, dt);
         let lead = late.as_ref().map_or(0, |late| late.lead);
         Ok(Self {
             plant: SampledModel::new(model.clone(), dt),
             settle: sos.settle_samples(SETTLED),
             delay_s: dt * (delay_samples(&sos) + lead as f64),
-            smooth: CausalSections::new(Some(&sos), 2 * n),
+            smooth: CausalSections::new(Some(&sos), 3 * n),
             late,
+            doubt: StandstillDoubt::of(model, settings, dt),
             count: 0,
             tau: vec![0.0; n],
-            row: vec![0.0; 2 * n],
+            row: vec![0.0; 3 * n],
             variance: vec![0.0; n],
         })
     }
@@ -176,7 +212,8 @@ impl ObserverCore {
         let motion = [sample.q, sample.v, sample.a];
         self.plant.torque(sample.t - first, motion, &mut self.tau);
         self.count += 1;
-        let (external, speed) = self.row.split_at_mut(n);
+        let (external, rest) = self.row.split_at_mut(n);
+        let (speed, doubt) = rest.split_at_mut(n);
         match &mut self.late {
             None => {
                 let torques = sample.tau.iter().zip(&self.tau);
@@ -193,18 +230,25 @@ impl ObserverCore {
         for (speed, v) in speed.iter_mut().zip(sample.v) {
             *speed = v.abs();
         }
+        for (j, doubt) in doubt.iter_mut().enumerate() {
+            *doubt = self.doubt.at(j, sample.v[j], sample.a[j]);
+        }
         self.smooth.step(&mut self.row);
         let settled = self.settle + self.late.as_ref().map_or(0, |late| late.size);
         if self.count <= settled {
             return;
         }
-        if let Some(directions) = uncertain {
-            directions.variances(motion, &mut self.variance);
+        match uncertain {
+            Some(directions) => directions.variances(motion, &mut self.variance),
+            None => self.variance.fill(0.0),
+        }
+        for (variance, doubt) in self.variance.iter_mut().zip(&self.row[2 * n..]) {
+            *variance += doubt * doubt;
         }
         out(&ExternalTorques {
             t: sample.t,
             external: &self.row[..n],
-            speed: &self.row[n..],
+            speed: &self.row[n..2 * n],
             variance: &self.variance,
             q: sample.q,
             v: sample.v,
@@ -271,7 +315,8 @@ impl TorqueDelay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cft_ident_core::robot::model::{JointFriction, Model};
+    use cft_ident_core::robot::friction::ViscousCoulomb;
+    use cft_ident_core::robot::model::Model;
     use cft_ident_core::robot::{JointKind, Robot};
 
     fn model() -> AugmentedModel {
@@ -331,5 +376,42 @@ mod tests {
             of.effects.push(delay.unwrap());
             check(of, late);
         }
+    }
+
+    #[test]
+    fn where_a_joint_hesitates_its_friction_is_in_doubt_and_elsewhere_it_is_not() {
+        let coulomb = ViscousCoulomb {
+            viscous: 0.0,
+            coulomb: 3.0,
+        };
+        let mut of = model();
+        of.model.friction = vec![JointFriction::ViscousCoulomb(coulomb)];
+        // the speed touches zero once a second and goes on, where friction falls within 5 mrad/s
+        let mut block = Block::default();
+        let whole = std::f64::consts::TAU;
+        for k in 0..6000 {
+            let t = f64::from(k) * 1e-3;
+            let (v, a) = (1.0 + (whole * t).cos(), -whole * (whole * t).sin());
+            block.t.push(t);
+            block.q.push(t + (whole * t).sin() / whole);
+            block.tau.push(0.8 * a + 0.1 + 3.0 * (v / 5e-3).tanh());
+        }
+        let mut observer = Observer::new(of, &FilterSettings::default()).unwrap();
+        let mut found = Vec::new();
+        let push = &mut |o: &ExternalTorques| found.push((o.t, o.external[0], o.variance[0]));
+        observer.push(&block, true, push).unwrap();
+        let delay = observer.delay_s().unwrap();
+        let mut most = 0.0f64;
+        for (t, external, variance) in found {
+            most = most.max(external.abs());
+            // beside the doubt, what the filter rings after it: a few percent
+            let most = 0.06 + 2.0 * variance.sqrt();
+            assert!(external.abs() < most, "{t} {external}");
+            let since = (t - delay - 0.5).rem_euclid(1.0);
+            if (0.3..0.7).contains(&since) {
+                assert!(variance.sqrt() < 0.02, "{t} {variance}");
+            }
+        }
+        assert!(most > 0.5, "{most}");
     }
 }

@@ -1,6 +1,6 @@
 //! An observer for one sampling step as numbers, for generated code.
 
-use super::observer::{ORDER, SETTLED, TorqueDelay};
+use super::observer::{ORDER, SETTLED, StandstillDoubt, TorqueDelay};
 use crate::band::{Direction, Directions};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::math::causal::delay_samples;
@@ -43,7 +43,9 @@ pub fn recipe(
     let late = TorqueDelay::of(model, step_s);
     let lead = late.as_ref().map_or(0, |late| late.lead);
     let threshold = excesses.threshold(per_hour);
-    let untouched = |held: &HeldOut| UntouchedTorques {
+    let doubt = StandstillDoubt::of(model, settings, step_s);
+    let untouched = |(held, coulomb): (&HeldOut, &f64)| UntouchedTorques {
+        coulomb: *coulomb,
         speed_edges: held.speed_edges.clone(),
         std: held.external_std.clone(),
         band: held.external_99,
@@ -74,7 +76,8 @@ pub fn recipe(
             size: late.size,
             by: late.by,
         }),
-        joints: held.iter().map(untouched).collect(),
+        joints: held.iter().zip(&doubt.levels).map(untouched).collect(),
+        reach_s: doubt.reach_s,
         uncertain: uncertain.collect(),
     })
 }
