@@ -315,6 +315,40 @@ fn a_motion_whose_torques_nobody_foresees_says_so_in_every_file() {
     );
 }
 
+#[test]
+fn a_motion_that_is_checked_has_the_deviations_that_its_design_said() {
+    let folder = fitted(0.8);
+    let path = folder.path();
+    let document = |line: &str| -> serde_json::Value {
+        good(path, &format!("{line} --json d.json"));
+        let text = fs::read_to_string(path.join("d.json")).unwrap();
+        serde_json::from_str(&text).unwrap()
+    };
+    let designed = document("excite -m model.toml --harmonics 2 --periods 2 -o motion.toml");
+    let said = good(path, "excite --check motion.toml -m model.toml");
+    let checked = document("excite --check motion.toml -m model.toml");
+    let slower = document("excite --check motion.toml -m model.toml --rate 100");
+    for of in [&designed, &checked, &slower] {
+        assert_eq!(of["noise_source"], "model");
+        assert_eq!(of["friction_fitted"], true);
+        let each = of["parameters"].as_array().unwrap();
+        assert!(!each.is_empty());
+        for (a, b) in each.iter().zip(designed["parameters"].as_array().unwrap()) {
+            let [a, b] = [a, b].map(|p| p["std"].as_f64().unwrap());
+            // rows are independent at the rate of the filter, whatever that of the log is
+            assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+        }
+    }
+    // the robot file gives no acceleration: what the log reached is named as such, with the line to write
+    let limits = checked["limits"].as_array().unwrap();
+    let of_logs = limits.iter().filter(|l| l["from_logs"] == true);
+    let kinds: Vec<&str> = of_logs.map(|l| l["quantity"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["acceleration", "acceleration"]);
+    for words in ["no limit of acceleration", "`acceleration = ", "(logs)"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
 /// A log with a body of `mass` at (0.1, 0.05, 0) of the last link, whose torque channels show `gains` times the torque.
 fn loaded(seed: u64, mass: f64, gains: [f64; 2]) -> String {
     let truth = truth(0.8);

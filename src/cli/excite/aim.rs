@@ -9,7 +9,7 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::log::escape;
 use cft_ident_plant::excite::information::InformationFactors;
 use cft_ident_plant::excite::limits::Quantity;
-use cft_ident_plant::excite::machine::ForeseenRobot;
+use cft_ident_plant::excite::machine::{ForeseenRobot, NoiseSource};
 use cft_ident_plant::excite::strokes::FrictionMemory;
 use cft_ident_plant::excite::{Criterion, ExciteError, InformationBefore, usual_motion};
 use cft_ident_stages::identify::RobotSetup;
@@ -144,6 +144,16 @@ pub(super) fn fundamental(machine: &ForeseenRobot) -> f64 {
     middle.map_or(FUNDAMENTAL_HZ, |hz| hz.min(FUNDAMENTAL_HZ))
 }
 
+/// Rate of the logs that a model was fitted to \[Hz\].
+pub(super) fn rate_of_logs(model: &ModelFile) -> Option<f64> {
+    let made = model.provenance.inputs.iter().filter(|log| log.made());
+    let (rows, seconds) = made.fold((0.0, 0.0), |(rows, seconds), log| {
+        (rows + log.samples as f64 - 1.0, seconds + log.duration_s)
+    });
+    let rate = rows / seconds;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
 /// The noise of every joint as the fit of a model left it: its rows are independent at twice the cut-off.
 pub(super) fn noise(model: &ModelFile, rate_hz: f64, machine: &mut ForeseenRobot) {
     let logged = RobotSetup::new("", model.robot.clone());
@@ -152,6 +162,7 @@ pub(super) fn noise(model: &ModelFile, rate_hz: f64, machine: &mut ForeseenRobot
     for (noise, name) in machine.noise.iter_mut().zip(names) {
         if let Some(std) = model.residual_std.get(name).filter(|std| **std > 0.0) {
             *noise = std * rows.sqrt();
+            machine.noise_source = NoiseSource::Model;
         }
     }
 }

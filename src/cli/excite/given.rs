@@ -9,7 +9,7 @@ use crate::cli::files;
 use cft_ident_core::inertia::accumulate;
 use cft_ident_files::config::RobotFile;
 use cft_ident_logs::log::{LogError, LogSpec};
-use cft_ident_plant::excite::machine::ForeseenRobot;
+use cft_ident_plant::excite::machine::{ForeseenRobot, NoiseSource};
 use cft_ident_plant::excite::{GivenInformation, Motion, foresee};
 use cft_ident_stages::identify::{IdentifyError, Log, LogData, RobotSetup};
 
@@ -19,9 +19,16 @@ const NOISE_SHARE: f64 = 0.01;
 /// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque, or 1 where no torque is foreseen.
 pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut ForeseenRobot) {
     let known = machine.source.known();
+    machine.noise_source = match known {
+        true => NoiseSource::RobotFile,
+        false => NoiseSource::One,
+    };
     let names = machine.model.robot.joint_names();
     for ((noise, name), usual) in machine.noise.iter_mut().zip(names).zip(usual) {
         let given = file.noise.joint.get(name).and_then(|n| n.torque_std);
+        if given.is_none() && known {
+            machine.noise_source = NoiseSource::Share;
+        }
         // a share of nothing is no noise: deviations are then for a noise of 1
         let share = match known {
             true => NOISE_SHARE * usual,

@@ -5,7 +5,7 @@ use crate::cli::error::CliError;
 use cft_ident_core::number;
 use cft_ident_plant::excite::limits::BoundedQuantity;
 use cft_ident_plant::excite::{
-    GivenInformation, LawForeseen, Motion, MotionJudgement, MotionTerms, judge,
+    GivenInformation, LawForeseen, Motion, MotionJudgement, MotionTerms, judge, lifted,
 };
 
 pub(super) fn judged(
@@ -25,7 +25,9 @@ pub(super) fn judged(
         criterion: &criterion_name(bench),
         seed: bench.args.seed,
     };
-    Ok(judge(&bench.machine, motion, terms)?)
+    let lifted = lifted(&bench.machine, motion, &terms)?;
+    let judged = judge(&bench.machine, motion, terms)?;
+    Ok(MotionJudgement { lifted, ..judged })
 }
 
 /// A design that breaks a limit is never written.

@@ -26,8 +26,8 @@ use cft_ident_plant::excite::ladder::foresee_ladder;
 use cft_ident_plant::excite::machine::ForeseenRobot;
 use cft_ident_plant::excite::usage::check_pose;
 use cft_ident_plant::excite::{
-    ExciteError, GivenInformation, LawForeseen, Motion, MotionJudgement, MotionJudgements,
-    PriorInformation, foresee, machine, usual_torque,
+    ExciteError, GivenInformation, InformationBefore, LawForeseen, Motion, MotionJudgement,
+    MotionJudgements, PriorInformation, foresee, machine, usual_torque,
 };
 use cft_ident_report::report::json::JsonDocument;
 use cft_ident_report::report::sections::provenance;
@@ -66,7 +66,7 @@ pub struct Args {
     pub model: Option<PathBuf>,
     /// What the next motion is for: the weak parameters of the model, whose intervals it narrows together with the
     /// logs that there are, or an effect that the logs do not distinguish from its like. Limits that the robot file does not
-    /// give are the positions, speeds and torques of the model's logs
+    /// give are the positions, speeds, accelerations and torques of the model's logs
     #[arg(long = "for", value_name = "weak|EFFECT:JOINT", requires = "model",
           conflicts_with_all = ["check", "joint", "criterion", "parameters"])]
     pub aim: Option<String>,
@@ -125,7 +125,7 @@ pub struct Args {
     #[arg(hide_short_help = true, long, value_name = "FILE.script", value_parser = arguments::ends_in(["script"]))]
     pub urscript: Option<PathBuf>,
     /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
-    /// [control], else 1000]
+    /// [control], else that of the model's logs, else 1000]
     #[arg(hide_short_help = true, long, value_name = "HZ", value_parser = arguments::positive)]
     pub rate: Option<f64>,
     /// Duration of a one-joint experiment, or of a checked motion that sets none [s] [default: 20, with --for what the
@@ -232,10 +232,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let aim = args.aim.as_ref();
     let aim = aim.map(|text| ExciteAim::of(text, &file, named.map(|(_, model)| model)));
     let aim = aim.transpose()?;
-    if let (Some(_), Some((_, model))) = (&aim, named) {
+    // one motion and one model give one table, whether it is designed or checked
+    let fitted = named
+        .filter(|(_, model)| aim.is_some() || args.check.is_some() && !model.held_out.is_empty());
+    let mut bounded = machine(&file, named)?;
+    if let Some((_, model)) = fitted {
+        let declared = bounded.channels;
         model.limit_to_seen(&mut file.limits);
+        bounded = machine(&file, named)?;
+        for channel in &mut bounded.channels {
+            channel.from_logs = !declared.contains(channel);
+        }
     }
-    let mut machine = machine(&file, named)?;
+    let mut machine = bounded;
     let names = machine.coordinate_names();
     if let Some(from) = args.from.as_ref().filter(|from| from.len() != names.len()) {
         let text = format!("--from gives {} numbers", from.len());
@@ -249,8 +258,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let fundamental = std::f64::consts::TAU * frequency_hz;
     let usual = usual_torque(&machine, fundamental, usize::from(args.harmonics));
     given::noise(&file, &usual, &mut machine);
-    let rate_hz = args.rate.or(file.control.rate_hz).unwrap_or(RATE_HZ);
-    if let (Some(_), Some((_, model))) = (&aim, named) {
+    let of_logs = named.and_then(|(_, model)| aim::rate_of_logs(model));
+    let rate_hz = args.rate.or(file.control.rate_hz).or(of_logs);
+    let rate_hz = rate_hz.unwrap_or(RATE_HZ);
+    if let Some((_, model)) = named {
         aim::noise(model, rate_hz, &mut machine);
     }
     let mut bench = ExciteRun {
@@ -297,6 +308,7 @@ fn check(bench: &mut ExciteRun, path: &Path, names: &OutputNames) -> Result<Outc
     let args = bench.args;
     let given = files::trajectory(path)?;
     bench.inputs.push(given.provenance);
+    let shown = given.name;
     let motion = Motion::of_file(&bench.machine, &given.value, bench.seconds, args.seed)?;
     let channels = bench.machine.channels.clone();
     let joints = bench.machine.model.robot.joint_names();
@@ -311,8 +323,18 @@ fn check(bench: &mut ExciteRun, path: &Path, names: &OutputNames) -> Result<Outc
         }
         _ => None,
     };
-    let judged = judged(bench, &motion, &channels, None, friction)?;
-    let report = written(bench, &motion, &judged, names, (&given.name, None))?;
+    let known = bench
+        .model
+        .as_ref()
+        .filter(|model| model.covariance.is_some());
+    let known = known.map(|model| InformationBefore::of(&bench.machine, model));
+    let given = known.map(|known| {
+        let mut given = GivenInformation::nothing(&bench.machine);
+        given.add_known(&known.information);
+        given
+    });
+    let judged = judged(bench, &motion, &channels, given.as_ref(), friction)?;
+    let report = written(bench, &motion, &judged, names, (&shown, None))?;
     let document = JsonDocument::new("excite", &bench.inputs, &judged.warnings, &judged)?;
     Ok(Outcome {
         missed: judged.broken(),

@@ -80,7 +80,8 @@ impl DraftInputs<'_> {
         self.log(&mut out);
         self.filter(&mut out);
         out.push_str(
-            "\n# Limits are used by `inspect`, `excite` and `simulate`; those of a URDF need not be repeated.\n",
+            "\n# Limits are used by `inspect`, `excite` and `simulate`; those of a URDF need not be repeated. It gives no accelerations:\n\
+             # where none stands here, the next motion of `excite` keeps to those of the logs.\n",
         );
         self.places(&mut out);
         if let Some(joint) = self.mapping.joints.first() {

@@ -12,7 +12,7 @@ use cft_ident_files::config::{ModelFile, RobotFile};
 use super::ExciteError;
 use super::foreseen::TorqueSource;
 use super::limits::{BoundedQuantity, Quantity};
-use super::machine::ForeseenRobot;
+use super::machine::{ForeseenRobot, NoiseSource};
 use super::series::{MAX_COORDINATES, Series};
 use super::space::DesignSpace;
 
@@ -54,6 +54,7 @@ pub fn machine(
         space: DesignSpace::default(),
         channels: Vec::new(),
         noise: vec![1.0; n],
+        noise_source: NoiseSource::One,
         coulomb_speed: vec![1.0; n],
     };
     machine.channels = channels(file, &machine.mechanism)?;

@@ -9,11 +9,11 @@ use super::foresee::{
     information,
 };
 use super::limits::{BoundedQuantity, Quantity};
-use super::machine::ForeseenRobot;
+use super::machine::{ForeseenRobot, NoiseSource};
 use super::motion::{spectrum, torque_band};
 use super::series::Series;
 use super::strokes::EffectSeparation;
-use super::usage::{ChannelUse, along_way};
+use super::usage::{ChannelUse, along_period, along_way};
 use super::{ExciteError, GivenInformation, Motion};
 use cft_ident_core::number;
 
@@ -50,7 +50,9 @@ pub struct MotionJudgement {
     pub torques_first: bool,
     /// What nobody looked at, in one sentence.
     pub not_checked: String,
-    /// Expected deviations, friction known.
+    /// Viscous and Coulomb friction are fitted with the inertial parameters; else friction is known.
+    pub friction_fitted: bool,
+    /// Expected deviations.
     pub parameters: Vec<ExpectedEstimate>,
     /// The combination of columns, scaled to norm 1, that is least certain; largest parts first.
     pub weakest_direction: Vec<UnknownShare>,
@@ -61,6 +63,11 @@ pub struct MotionJudgement {
     pub friction: Option<LawForeseen>,
     /// The noise that deviations are expected from.
     pub noise: Vec<TorqueNoise>,
+    /// Where that noise is from.
+    pub noise_source: NoiseSource,
+    /// What those limits cost that the logs of the model set, where the robot file gives none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lifted: Option<LiftedLimits>,
     /// Rows per joint that the deviations stand for.
     pub rows: f64,
     /// Rate of the log that is foreseen \[Hz\].
@@ -117,6 +124,8 @@ pub struct LimitUse {
     /// Time at which it comes nearest \[s\]; a share of the way on one.
     pub t: f64,
     pub broken: bool,
+    /// The robot file gives none: it is what the logs of the model reached.
+    pub from_logs: bool,
 }
 
 /// Expected deviations of a friction law.
@@ -126,6 +135,15 @@ pub struct LawForeseen {
     pub parameters: Vec<ExpectedEstimate>,
     /// Relative deviations from the usual ladder, in the same order.
     pub usual_relative_std: Option<Vec<Option<f64>>>,
+}
+
+/// The same path, faster, as far as the limits of the robot file alone allow.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LiftedLimits {
+    /// How many times as fast.
+    pub pace: f64,
+    /// How many times as narrow the expected deviations are: least, median and most of the parameters.
+    pub narrower: [f64; 3],
 }
 
 /// Noise of a joint's torque.
@@ -247,6 +265,7 @@ pub fn judge(
         torques: machine.source.sentence(),
         torques_foreseen: machine.source.known(),
         torques_first: machine.source.caution().is_some(),
+        friction_fitted: machine.columns.own.iter().any(|own| !own.is_empty()),
         not_checked: machine.space.not_checked(way.is_some()),
         way: way.map(|way| way.iter().map(LimitUse::of).collect()),
         parameters,
@@ -255,6 +274,8 @@ pub fn judge(
         together: terms.given.map(with).transpose()?,
         friction: terms.friction,
         noise: noise.collect(),
+        noise_source: machine.noise_source,
+        lifted: None,
         rows,
         rate_hz: terms.rate_hz,
         spectrum,
@@ -267,6 +288,68 @@ pub fn judge(
         separates: None,
         warnings,
     })
+}
+
+/// Least gain of pace that is worth a word.
+const WORTH_A_WORD: f64 = 1.1;
+/// Pace from which on nothing bounds a motion.
+const MOST_PACE: f64 = 64.0;
+/// Halvings of the interval of paces.
+const HALVINGS: usize = 12;
+
+/// What limits cost that are those of the logs: none where there are none, or the others allow hardly more.
+///
+/// # Errors
+/// [`ExciteError::Robot`] where the machine cannot follow.
+pub fn lifted(
+    machine: &ForeseenRobot,
+    motion: &Motion,
+    terms: &MotionTerms,
+) -> Result<Option<LiftedLimits>, ExciteError> {
+    let declared = terms.channels.iter().filter(|c| !c.from_logs);
+    let declared: Vec<BoundedQuantity> = declared.cloned().collect();
+    let Motion::Periodic { series, blend } = motion else {
+        return Ok(None);
+    };
+    if declared.len() == terms.channels.len() {
+        return Ok(None);
+    }
+    let keeps = |pace: f64| {
+        let uses = along_period(machine, &declared, &series.at_pace(pace));
+        uses.iter().all(|of| of.share <= 1.0)
+    };
+    // nothing else bounds it
+    if keeps(MOST_PACE) {
+        return Ok(None);
+    }
+    let (mut kept, mut broken) = (1.0, MOST_PACE);
+    for _ in 0..HALVINGS {
+        let middle = (kept * broken).sqrt();
+        match keeps(middle) {
+            true => kept = middle,
+            false => broken = middle,
+        }
+    }
+    if kept < WORTH_A_WORD {
+        return Ok(None);
+    }
+    let expected_at = |pace: f64| {
+        let faster = Motion::Periodic {
+            series: series.at_pace(pace),
+            blend: *blend,
+        };
+        let (information, _) = information(machine, &faster, terms.rate_hz, terms.seconds)?;
+        expected(machine, &information, terms.rate_hz, None)
+    };
+    let [now, then] = [expected_at(1.0)?, expected_at(kept)?].map(|of| of.parameters);
+    let ratio = |(a, b): (&ExpectedEstimate, &ExpectedEstimate)| Some(a.std? / b.std?);
+    let mut ratios: Vec<f64> = now.iter().zip(&then).filter_map(ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    let all = ratios.first().zip(ratios.last());
+    Ok(all.map(|(least, most)| LiftedLimits {
+        pace: kept,
+        narrower: [*least, ratios[ratios.len() / 2], *most],
+    }))
 }
 
 /// Amplitudes of a series, coordinate after coordinate.
@@ -341,7 +424,9 @@ impl LimitUse {
             most: along.range[1],
             used: along.share,
             t: along.t,
-            broken: along.share > 1.0,
+            // beyond what logs reached a motion is no danger
+            broken: along.share > 1.0 && !channel.from_logs,
+            from_logs: channel.from_logs,
         }
     }
 

@@ -94,6 +94,8 @@ pub struct BoundedQuantity {
     pub lower: f64,
     /// The most that is allowed.
     pub upper: f64,
+    /// The robot file gives none: it is what the logs of the model reached.
+    pub from_logs: bool,
 }
 
 impl BoundedQuantity {
@@ -116,6 +118,7 @@ impl BoundedQuantity {
             unit: unit.to_owned(),
             lower,
             upper,
+            from_logs: false,
         }
     }
 

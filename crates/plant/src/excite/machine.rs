@@ -3,6 +3,9 @@
 
 use std::cell::OnceCell;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::simulate::Mechanism;
 use cft_ident_core::inertia::columns::{JointTerm, RegressorColumns};
 use cft_ident_core::robot::RobotError;
@@ -31,8 +34,38 @@ pub struct ForeseenRobot {
     pub channels: Vec<BoundedQuantity>,
     /// Standard deviation of the noise on each joint's torque \[N or N m\], sample by sample.
     pub noise: Vec<f64>,
+    /// Where that noise is from.
+    pub noise_source: NoiseSource,
     /// Speeds above which the sign in a Coulomb column counts as whole, per joint \[m/s or rad/s\].
     pub coulomb_speed: Vec<f64>,
+}
+
+/// Where the noise of the torques is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseSource {
+    /// What the fit of the model left of its logs.
+    Model,
+    /// `[noise]` of the robot file.
+    RobotFile,
+    /// A share of each joint's usual torque, where the robot file gives none.
+    Share,
+    /// 1 N or N m in every sample: no torque is foreseen.
+    One,
+}
+
+impl NoiseSource {
+    /// What it is, behind "the noise is".
+    pub fn words(self) -> &'static str {
+        match self {
+            NoiseSource::Model => "what the fit of the model left of its logs",
+            NoiseSource::RobotFile => "that of the robot file",
+            NoiseSource::Share => {
+                "1 % of each joint's usual torque, where the robot file gives none"
+            }
+            NoiseSource::One => "1 N or N m in every sample, where the robot file gives none",
+        }
+    }
 }
 
 /// Everything at one instant.

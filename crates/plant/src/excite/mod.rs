@@ -43,7 +43,7 @@ pub use criterion::Criterion;
 pub use foreseen::TorqueSource;
 pub use from_files::{machine, series_of, trajectory};
 pub use given::GivenInformation;
-pub use judgement::{LawForeseen, MotionJudgement, MotionJudgements, MotionTerms, judge};
+pub use judgement::{LawForeseen, MotionJudgement, MotionJudgements, MotionTerms, judge, lifted};
 pub use known::InformationBefore;
 pub use motion::Motion;
 pub use objective::{NoValue, PriorInformation};

@@ -107,6 +107,14 @@ impl Series {
         }
     }
 
+    /// The same path so many times as fast.
+    pub fn at_pace(&self, pace: f64) -> Self {
+        Series {
+            fundamental: pace * self.fundamental,
+            ..self.scaled(pace)
+        }
+    }
+
     /// The amplitudes of every coordinate times `factor`.
     pub fn scaled(&self, factor: f64) -> Self {
         let mut out = self.clone();

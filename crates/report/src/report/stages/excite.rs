@@ -1,5 +1,7 @@
 //! The report of `excite`: a motion, judged before the robot moves.
 
+use std::collections::BTreeSet;
+
 use super::diagnose_words::DiagnosisWords;
 use crate::report::figure::{MotionFigure, MotionPanel};
 use crate::report::table::{Columns, Table, unbroken};
@@ -44,6 +46,10 @@ pub fn excite(judged: &MotionJudgement, path: &str, name: &str) -> Report {
     report.terminal().table(limits(judged, path));
     report.page().table(limits(judged, &name));
     report.page().list(judged.broken());
+    if let Some(text) = limits_of_logs(judged) {
+        report.terminal().line("");
+        report.everywhere().paragraph(&text);
+    }
     report.terminal().line("");
     if judged.separates.is_some() {
         return report;
@@ -58,18 +64,20 @@ pub fn excite(judged: &MotionJudgement, path: &str, name: &str) -> Report {
         report.everywhere().table(table);
         return report;
     }
-    let noise = match judged.torques_foreseen {
-        true => "Friction is taken as known; the noise is that of the robot file.",
-        false => {
-            "Friction is taken as known; the noise is that of the robot file, or 1 N or N m in every sample where it gives none."
-        }
+    let friction = match judged.friction_fitted {
+        true => "fitted with them",
+        false => "known",
     };
-    report.page().paragraph(noise);
+    let noise = judged.noise_source.words();
+    report
+        .page()
+        .paragraph(&format!("Friction is {friction}; the noise is {noise}."));
     let together = judged.together.as_ref().map(|together| {
         let stds = together.parameters.iter().map(|p| p.relative_std);
         ("with given", stds.collect())
     });
-    let caption = format!("expected from {rows} samples, friction known:");
+    let caption =
+        format!("expected from {rows} samples, friction {friction}; the noise is {noise}:");
     let table = expected(&caption, &judged.parameters, together);
     report.everywhere().table(table);
     report.terminal().line("");
@@ -117,10 +125,11 @@ fn verdict(judged: &MotionJudgement, name: &str) -> DiagnosisWords {
             FigureTone::Plain
         };
         let value = format!(
-            "{} ({} {})",
+            "{} ({} {}{})",
             number::percent(nearest.used),
             nearest.name,
-            nearest.quantity.called(&nearest.unit)
+            nearest.quantity.called(&nearest.unit),
+            if nearest.from_logs { ", logs" } else { "" }
         );
         figures.push(figure("nearest limit", value, tone));
     }
@@ -169,6 +178,35 @@ fn verdict(judged: &MotionJudgement, name: &str) -> DiagnosisWords {
     }
 }
 
+/// Which limits are those of the logs, and what they cost.
+fn limits_of_logs(judged: &MotionJudgement) -> Option<String> {
+    let own: Vec<&LimitUse> = judged.limits.iter().filter(|l| l.from_logs).collect();
+    let nearest = own.iter().max_by(|a, b| a.used.total_cmp(&b.used))?;
+    let named = own.iter().map(|limit| limit.quantity.called(&limit.unit));
+    let kinds: BTreeSet<&str> = named.collect();
+    let kinds: Vec<&str> = kinds.into_iter().collect();
+    let [lower, upper] = [nearest.lower, nearest.upper].map(|x| number::significant(x, 3));
+    let line = match nearest.quantity.called(&nearest.unit) {
+        "position" => format!("position = [{lower}, {upper}]"),
+        key => format!("{key} = {upper}"),
+    };
+    let gain = judged.lifted.as_ref().map(|lifted| {
+        let pace = number::significant(lifted.pace, 2);
+        let [least, median, most] = lifted.narrower.map(|x| number::significant(x, 2));
+        format!(
+            " Without them the other limits allow the same path {pace} times as fast, whose parameters are {median} times as \
+             certain in the median ({least} to {most} times)."
+        )
+    });
+    Some(format!(
+        "The robot file gives no limit of {}: what the logs reached counts, marked (logs) in the table. To allow more, write \
+         what the robot can do there; this is `{line}` under `[limits.{}]`.{}",
+        kinds.join(", "),
+        nearest.name,
+        gain.unwrap_or_default()
+    ))
+}
+
 fn limits(judged: &MotionJudgement, name: &str) -> Table {
     let value = |v: f64| number::significant(v, 4);
     let periods = judged.periods.map(|periods| format!(", {periods} periods"));
@@ -185,9 +223,12 @@ fn limits(judged: &MotionJudgement, name: &str) -> Table {
         })
         .numbers("from", |limit| value(limit.least))
         .numbers("to", |limit| value(limit.most))
-        .words("allowed", |limit| match limit.upper.is_finite() {
-            true => format!("{} .. {}", value(limit.lower), value(limit.upper)),
-            false => format!("{} ..", value(limit.lower)),
+        .words("allowed", |limit| {
+            let of_logs = if limit.from_logs { " (logs)" } else { "" };
+            match limit.upper.is_finite() {
+                true => format!("{} .. {}{of_logs}", value(limit.lower), value(limit.upper)),
+                false => format!("{} ..", value(limit.lower)),
+            }
         })
         .words("unit", |limit| &limit.unit)
         .numbers("used", |limit| {
