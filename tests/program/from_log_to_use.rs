@@ -349,6 +349,39 @@ fn a_motion_that_is_checked_has_the_deviations_that_its_design_said() {
     }
 }
 
+#[test]
+fn a_log_that_disagrees_with_the_others_is_named_and_the_error_of_each_is_printed() {
+    let folder = fitted(0.8);
+    let path = folder.path();
+    let truth = truth(0.8);
+    for (name, phase) in [("a.csv", 0.0), ("b.csv", 0.9), ("c.csv", 1.7)] {
+        fs::write(path.join(name), log(&truth, phase, 1.0)).unwrap();
+    }
+    fs::write(path.join("loaded.csv"), loaded(3, 1.5, [1.0; 2])).unwrap();
+    let (status, out, err) = run(path, "lsq a.csv b.csv c.csv -r arm.toml -o m.toml");
+    assert_eq!(status, 0);
+    assert!(!err.contains("disagree"), "{err}");
+    assert!(out.contains("relative error in each log"), "{out}");
+    let line = "lsq a.csv loaded.csv b.csv c.csv -r arm.toml -o m.toml --json m.json";
+    let (status, _, err) = run(path, line);
+    assert_eq!(status, 0);
+    assert!(
+        err.contains("loaded.csv disagrees with the other logs"),
+        "{err}"
+    );
+    let document: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(path.join("m.json")).unwrap()).unwrap();
+    let logs = document["by_log"].as_array().unwrap();
+    let names: Vec<&str> = logs.iter().map(|l| l["log"].as_str().unwrap()).collect();
+    assert_eq!(names, ["a.csv", "loaded.csv", "b.csv", "c.csv"]);
+    let (_, _, err) = run(path, "lsq a.csv loaded.csv -r arm.toml -o m.toml");
+    assert!(
+        err.contains("loaded.csv and a.csv disagree")
+            || err.contains("a.csv and loaded.csv disagree"),
+        "{err}"
+    );
+}
+
 /// A log with a body of `mass` at (0.1, 0.05, 0) of the last link, whose torque channels show `gains` times the torque.
 fn loaded(seed: u64, mass: f64, gains: [f64; 2]) -> String {
     let truth = truth(0.8);

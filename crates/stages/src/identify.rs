@@ -60,7 +60,7 @@ pub use crate::held_out::compare::{
     Compared, ComparedFile, ComparisonResult, DIFFERENT, FrictionCurves, TriedOnLogs, compare,
 };
 pub use crate::held_out::hold_out::Held;
-pub use crate::held_out::residual::{JointResidual, RelativeError};
+pub use crate::held_out::residual::{ErrorOfLog, JointResidual, RelativeError};
 pub use crate::held_out::torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use crate::held_out::validate::{
     ErrorsByUse, ErrorsOfLogs, ValidateSettings, Validated, not_a_validation, validate,

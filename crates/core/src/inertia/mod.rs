@@ -8,6 +8,7 @@
 //! and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque channel is at its joint.
 
 pub mod accumulate;
+pub mod between_logs;
 pub mod by_speed;
 pub mod closed_loop;
 pub mod columns;

@@ -13,7 +13,7 @@ use super::lsq_problem::LsqProblem;
 use super::motion_fit::MotionFit;
 use super::weakest::{WeakestPart, weakest};
 use crate::held_out::hold_out::{Held, hold_out, or_note};
-use crate::held_out::residual::{JointResidual, RelativeError};
+use crate::held_out::residual::{ErrorOfLog, JointResidual, RelativeError};
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
 use crate::input::error::IdentifyError;
@@ -61,6 +61,9 @@ pub struct IdentifiedDynamics {
     pub effective_samples: f64,
     /// Residual of the model that is written, on the logs that were fitted, as `validate` gives it.
     pub joints: Vec<JointResidual>,
+    /// The same of each log, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub by_log: Vec<ErrorOfLog>,
     /// Residual of the plain fit in the rows in which each joint moves, where the model computes with physically consistent parameters.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unconstrained_residual: Vec<RelativeError>,
@@ -143,6 +146,7 @@ impl IdentifiedDynamics {
             samples: fit.rows * setup.robot.joints() as u64,
             effective_samples: fit.effective_rows * setup.robot.joints() as f64,
             joints: Vec::new(),
+            by_log: Vec::new(),
             unconstrained_residual: unconstrained,
             by_motion: None,
             position_cutoffs: judged.position_cutoffs,

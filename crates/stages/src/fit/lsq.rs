@@ -8,7 +8,7 @@ use super::judged_estimate::JudgedEstimate;
 use super::lsq_notes::lsq_notes;
 use super::lsq_problem::{LsqProblem, LsqSettings};
 use super::replayed_torque::replayed;
-use crate::held_out::residual::JointResidual;
+use crate::held_out::residual::{ErrorOfLog, JointResidual};
 use crate::held_out::validate::errors_on_fitted;
 use crate::input::control::Control;
 use crate::input::dataset::Dataset;
@@ -33,8 +33,11 @@ pub fn lsq(
     let mut found = IdentifiedDynamics::new(&problem, &rows, judged, notes)?;
     // every figure is that of the numbers that are written
     let model = found.model(&data.setup, problem.friction_file());
-    let errors = errors_on_fitted(data, &model, control)?;
+    let (errors, by_log) = errors_on_fitted(data, &model, control)?;
     found.joints = errors.joints.into_iter().map(JointResidual::of).collect();
+    if by_log.len() > 1 {
+        found.by_log = by_log.into_iter().map(ErrorOfLog::of).collect();
+    }
     found.notes.extend(no_drive(&problem, &found)?);
     found.notes.extend(mostly_offset(&found));
     found.notes.extend(replayed(&data.logs, control)?);

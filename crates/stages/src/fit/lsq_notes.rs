@@ -11,6 +11,8 @@ use crate::input::lsq_rows::LsqRows;
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
 use crate::note::{FitNote, NumberWithStd, StageNote};
+use cft_ident_core::inertia::accumulate::BlockFactors;
+use cft_ident_core::inertia::between_logs::disagreeing_log;
 use cft_ident_core::inertia::instruments::ReferenceSource;
 use cft_ident_core::inertia::solution::ConfoundedUnknowns;
 use cft_ident_core::inertia::solve::Fit;
@@ -46,6 +48,7 @@ pub(crate) fn lsq_notes(
     let failed = judged.not_consistent.then_some(FitNote::NotConsistent);
     let resting = rests(setup, &estimate.basis.sums.resting_shares());
     notes.extend(failed.into_iter().chain(resting).map(StageNote::Fit));
+    notes.extend(disagreement(setup, rows, &estimate.basis.sums));
     notes.extend(doubts_of_friction(problem, judged)?);
     let doubts = confounded(&estimate.fit, &judged.unknowns);
     let doubts = bridged.into_iter().chain(doubts);
@@ -55,6 +58,19 @@ pub(crate) fn lsq_notes(
     let geometry = judged.geometry.iter().cloned().map(Box::new);
     notes.extend(geometry.map(FitNote::Geometry).map(StageNote::Fit));
     Ok(notes)
+}
+
+/// A log that one fit does not bring together with the others.
+fn disagreement(setup: &RobotSetup, rows: &LsqRows, sums: &BlockFactors) -> Option<StageNote> {
+    let found = disagreeing_log(sums).ok().flatten()?;
+    let names = rows.names_in_order();
+    Some(StageNote::Fit(FitNote::Disagrees {
+        log: names.get(found.log)?.clone(),
+        other: (names.len() == 2).then(|| names[1 - found.log].clone()),
+        joint: setup.robot.joint_names()[found.joint].clone(),
+        own: found.own,
+        others: found.others,
+    }))
 }
 
 /// What is noticed of how the fit was made.

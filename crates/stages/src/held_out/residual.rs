@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::validate::ErrorsOfLogs;
 use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::validate::JointError;
 
@@ -41,6 +42,30 @@ pub struct JointResidual {
     pub rmse_moving: Option<f64>,
     /// The same of the rows in which it rests; null where it never does.
     pub relative_error_rest: Option<f64>,
+}
+
+/// What a fit leaves of one of its logs.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ErrorOfLog {
+    pub log: String,
+    /// Residual relative to the torque, of the joints that move in it and the rows in which they do.
+    pub joints: Vec<RelativeError>,
+}
+
+impl ErrorOfLog {
+    /// Of the errors on one log.
+    pub(crate) fn of(found: ErrorsOfLogs) -> Self {
+        let moving = found.errors.joints.into_iter().filter_map(|joint| {
+            Some(RelativeError {
+                relative_error: joint.relative_error_moving?,
+                joint: joint.joint,
+            })
+        });
+        ErrorOfLog {
+            log: found.logs.join(", "),
+            joints: moving.collect(),
+        }
+    }
 }
 
 impl JointResidual {

@@ -36,6 +36,9 @@ pub struct Validated {
     pub open_loop: Option<OpenLoop>,
     /// The motion that the model makes of the measured torques in windows; null where the logs do not allow it.
     pub free_run: Option<FreeRun>,
+    /// Errors of each log, in their order.
+    #[serde(skip)]
+    pub by_log: Vec<TorqueErrors>,
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
@@ -133,16 +136,21 @@ pub fn validate(
     Ok(found)
 }
 
-/// The errors of a model on the logs that it was fitted to, as [`validate`] gives them.
+/// The errors of a model on the logs that it was fitted to, as [`validate`] gives them: of all, and log by log.
 pub(crate) fn errors_on_fitted(
     data: &Dataset,
     file: &ModelFile,
     control: &Control,
-) -> Result<TorqueErrors, IdentifyError> {
+) -> Result<(TorqueErrors, Vec<ErrorsOfLogs>), IdentifyError> {
     let model = refined(file, &data.setup.name)?;
     let smoothed = &smoothed(data, &model, control)?;
     let found = reconstruct(smoothed, (&model, file), None, control, &mut |_, _| {})?;
-    Ok(found.validation.errors)
+    let named = found.inputs.iter().zip(found.by_log);
+    let by_log = named.map(|(input, errors)| ErrorsOfLogs {
+        logs: vec![input.name.clone()],
+        errors,
+    });
+    Ok((found.validation.errors, by_log.collect()))
 }
 
 fn errors_of(
@@ -314,8 +322,10 @@ fn reconstruct(
         unseen: part(false),
         used: part(true),
     });
+    let by_log = (0..inputs.len()).map(|own| all.errors_of(|log| log == own));
     let mut found = Validated {
         by_use,
+        by_log: by_log.collect(),
         open_loop: None,
         free_run: None,
         validation: all.finish(summary),

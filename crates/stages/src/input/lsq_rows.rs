@@ -16,7 +16,7 @@ use cft_ident_core::inertia::encoder::{self, GRIDS, NOISY, PositionNoise, accumu
 use cft_ident_core::inertia::jumps::{ResidualJump, jumps};
 use cft_ident_core::inertia::robust::RowWeigher;
 use cft_ident_core::motion::{FilterSettings, Summary};
-use cft_ident_logs::log::{Block, Provenance};
+use cft_ident_logs::log::{Block, Provenance, escape};
 
 /// Chooses the noise that is added to positions.
 const NOISE_SEED: u64 = 1;
@@ -254,6 +254,18 @@ impl<'a> LsqRows<'a> {
             total.merge(sums);
             total
         })
+    }
+
+    /// Names of the logs, in the order in which their sums are merged.
+    pub(crate) fn names_in_order(&self) -> Vec<String> {
+        let mut seen: Vec<&SeenLog> = self.seen().collect();
+        seen.sort_by_key(|seen| seen.key());
+        let names = seen.iter().map(|seen| {
+            let span = seen.provenance.span.iter();
+            let span: String = span.map(|span| format!("@{span}")).collect();
+            escape(&seen.provenance.name) + &span
+        });
+        names.collect()
     }
 
     /// The rows of all logs; where a weigher is given, each by its weight.

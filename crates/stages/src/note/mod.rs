@@ -174,6 +174,17 @@ pub struct NumberWithStd {
 /// What was noticed of a fit by least squares.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FitNote {
+    /// A log that one fit does not bring together with the others.
+    Disagrees {
+        log: String,
+        /// The others, where it is one of two.
+        other: Option<String>,
+        joint: String,
+        /// Relative residual of the joint in this log by the fit of all logs, and by its own.
+        own: [f64; 2],
+        /// The same in the others.
+        others: [f64; 2],
+    },
     /// Friction is fitted with the inertias; `law` where that is law (18), by refinement.
     FrictionFitted { law: bool },
     /// The friction stays as a reduced log, which is named, was made with.

@@ -14,9 +14,9 @@ use crate::report::{
 use cft_ident_core::number;
 use cft_ident_core::verdict::IDENTIFIED;
 use cft_ident_files::config::ModelFile;
-use cft_ident_logs::log::Provenance;
+use cft_ident_logs::log::{Provenance, escape};
 use cft_ident_stages::identify::{
-    FrictionOfFit, Gain, IdentifiedDynamics, JointResidual, MotionFit, RobotSetup,
+    ErrorOfLog, FrictionOfFit, Gain, IdentifiedDynamics, JointResidual, MotionFit, RobotSetup,
 };
 use cft_ident_stages::replay::ReplayedLogs;
 
@@ -37,6 +37,9 @@ pub struct LsqReport<'a> {
 /// Parameters that a screen has room for.
 const MAX_PARAMETERS_ON_SCREEN: usize = 8;
 
+/// Logs that a screen has room for: those with the greatest errors.
+const MAX_LOGS_ON_SCREEN: usize = 6;
+
 /// The verdict, the residual of the fit, the parameters and the quality of the fit.
 pub fn lsq(of: &LsqReport) -> Report {
     let mut report = Report::new(&format!("Least squares fit to {}", escaped(of.logs)));
@@ -56,8 +59,10 @@ pub fn lsq(of: &LsqReport) -> Report {
     if let Some(more) = more {
         report.usual().line(&more);
     }
+    by_log(&mut report.usual(), of.found, MAX_LOGS_ON_SCREEN);
     let all: Vec<usize> = (0..relative.len()).collect();
     residuals(&mut report.detail(), of.found, &all);
+    by_log(&mut report.detail(), of.found, usize::MAX);
     let mut parameters = match of.found.unknowns.len() <= MAX_PARAMETERS_ON_SCREEN {
         true => report.terminal(),
         false => report.detail(),
@@ -250,6 +255,42 @@ pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics, joints: &[usiz
             unbroken(&format!("{} {error}", plain[j].joint))
         });
         writer.line(&format!("unconstrained residual: {}", listed(shown)));
+    }
+}
+
+/// What the model leaves of each log, the greatest errors first; nothing of a single log.
+fn by_log(writer: &mut Writer, found: &IdentifiedDynamics, most: usize) {
+    let mean = |log: &ErrorOfLog| {
+        let squares = log.joints.iter().map(|joint| joint.relative_error.powi(2));
+        (squares.sum::<f64>() / log.joints.len().max(1) as f64).sqrt()
+    };
+    let mut logs: Vec<&ErrorOfLog> = found.by_log.iter().collect();
+    logs.sort_by(|a, b| mean(b).total_cmp(&mean(a)));
+    if logs.is_empty() {
+        return;
+    }
+    let largest = |log: &ErrorOfLog| {
+        let joints = log.joints.iter();
+        let of = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
+        of.map_or(number::ABSENT.to_owned(), |joint| {
+            unbroken(&format!(
+                "{} {}",
+                joint.joint,
+                number::percent(joint.relative_error)
+            ))
+        })
+    };
+    let columns = Columns::new("relative error in each log", logs.iter().take(most))
+        .words("log", |log| escape(&log.log))
+        .percent("relative error", |log| mean(log))
+        .words("largest", |log| largest(log));
+    writer.line("");
+    writer.table(columns);
+    if logs.len() > most {
+        writer.line(&format!(
+            "{} more logs with smaller errors",
+            logs.len() - most
+        ));
     }
 }
 

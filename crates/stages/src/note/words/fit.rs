@@ -9,6 +9,28 @@ use cft_ident_core::number::{percent, significant, value_and_std};
 impl Display for FitNote {
     fn fmt(&self, f: &mut Formatter) -> Result {
         match self {
+            Self::Disagrees {
+                log,
+                other,
+                joint,
+                own,
+                others,
+            } => {
+                let [[all, alone], [all_others, without]] =
+                    [own, others].map(|pair| pair.map(percent));
+                let who = match other {
+                    Some(other) => format!("{log} and {other} disagree"),
+                    None => format!("{log} disagrees with the other logs"),
+                };
+                let rest = match other {
+                    Some(other) => format!("that of {other} {all_others} and {without}"),
+                    None => format!("that of the others {all_others}, and {without} without it"),
+                };
+                write!(
+                    f,
+                    "{who}: one fit misses {all} of the torque of {joint} in {log}, a fit of that log alone {alone}; {rest}. Another load, tool, gain or sign, or friction that changed: fit them apart, and see `compare` of the two models"
+                )
+            }
             Self::FrictionFitted { law: true } => f.write_str(
                 "friction is fitted together with the inertias, for there are no one-joint logs of it: linear columns first, then the law of (18) by refinement",
             ),
