@@ -365,21 +365,13 @@ fn a_log_that_disagrees_with_the_others_is_named_and_the_error_of_each_is_printe
     let line = "lsq a.csv loaded.csv b.csv c.csv -r arm.toml -o m.toml --json m.json";
     let (status, _, err) = run(path, line);
     assert_eq!(status, 0);
-    assert!(
-        err.contains("loaded.csv disagrees with the other logs"),
-        "{err}"
-    );
+    let words = "loaded.csv disagrees with the other logs";
+    assert!(err.contains(words), "{err}");
     let document: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(path.join("m.json")).unwrap()).unwrap();
     let logs = document["by_log"].as_array().unwrap();
     let names: Vec<&str> = logs.iter().map(|l| l["log"].as_str().unwrap()).collect();
     assert_eq!(names, ["a.csv", "loaded.csv", "b.csv", "c.csv"]);
-    let (_, _, err) = run(path, "lsq a.csv loaded.csv -r arm.toml -o m.toml");
-    assert!(
-        err.contains("loaded.csv and a.csv disagree")
-            || err.contains("a.csv and loaded.csv disagree"),
-        "{err}"
-    );
 }
 
 /// A log with a body of `mass` at (0.1, 0.05, 0) of the last link, whose torque channels show `gains` times the torque.

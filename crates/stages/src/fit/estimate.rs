@@ -11,6 +11,7 @@ use crate::input::lsq_rows::{LsqRows, PositionReading};
 use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::add_processing;
+use cft_ident_core::inertia::between_logs::{DisagreeingLog, disagreeing_log};
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::departure;
 use cft_ident_core::inertia::encoder::{add_scatter, bias};
@@ -112,12 +113,15 @@ pub struct FitRows {
     pub parts: FitParts,
     /// What their solution lacks to the fit's parameters: a law that they are linear about.
     pub shift: DVector<f64>,
+    /// The log that one fit does not bring together with the others.
+    pub disagreeing: Option<DisagreeingLog>,
 }
 
 impl FitRows {
     /// Rows that no law shifts, of so many unknowns.
     fn in_one_block(sums: &BlockFactors, unknowns: usize) -> Self {
         FitRows {
+            disagreeing: disagreeing_log(sums).ok().flatten(),
             sums: sums.in_one_block(),
             parts: FitParts::default(),
             shift: DVector::zeros(unknowns),
