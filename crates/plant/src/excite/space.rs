@@ -209,7 +209,7 @@ impl DesignSpace {
             )),
         }
         if !way {
-            parts.push("the way there".to_owned());
+            parts.push("the path to the first point".to_owned());
         }
         format!("NOT CHECKED: {}.", parts.join("; "))
     }
@@ -302,7 +302,7 @@ mod tests {
         let bare = ARM.split("[limits]").next().unwrap_or_default();
         assert_eq!(
             shown(bare, false),
-            "NOT CHECKED: collisions of the robot with itself or around it; the way there."
+            "NOT CHECKED: collisions of the robot with itself or around it; the path to the first point."
         );
     }
 }

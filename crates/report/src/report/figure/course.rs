@@ -29,6 +29,8 @@ pub(crate) struct CourseFigure {
     pub title: String,
     /// `s`, `h`, `d`, or nothing where logs are counted.
     pub time_unit: String,
+    /// What the dots are, and the line.
+    pub key: [&'static str; 2],
     pub panels: Vec<CoursePanel>,
 }
 
@@ -42,10 +44,13 @@ const BAND: f64 = 1.96;
 impl CourseFigure {
     /// The panels as pictures of their own.
     pub fn cells(&self) -> PictureGroup {
-        let mut key = vec![
-            (Key::Spot(colour::MUTED), "estimate of one log"),
-            (Key::Band(COURSE), "smoothed, 95 %"),
-        ];
+        let [dots, line] = self.key;
+        let has_band = self.panels.iter().any(|panel| {
+            let known = panel.course.iter().flatten();
+            known.into_iter().any(|[_, std]| *std > 0.0)
+        });
+        let course = if has_band { Key::Band } else { Key::Line };
+        let mut key = vec![(Key::Spot(colour::MUTED), dots), (course(COURSE), line)];
         if self.panels.iter().any(|panel| !panel.changes.is_empty()) {
             key.push((Key::Line(CHANGE), "change"));
         }
@@ -137,6 +142,7 @@ mod tests {
         let figure = |panel: &CoursePanel| CourseFigure {
             title: "arm".into(),
             time_unit: "d".into(),
+            key: ["estimate of one log", "smoothed, 95 %"],
             panels: vec![panel.clone()],
         };
         let cells = figure(&panel).cells();

@@ -16,7 +16,7 @@ pub fn section(writer: &mut Writer, found: Option<&FreeRun>) {
         return;
     }
     let caption = format!(
-        "free run: rms error of the positions that the model makes of the measured torques, {} windows of {} s",
+        "simulated position error: rms of the positions that the model makes of the measured torques, {} windows of {} s",
         found.windows,
         number::significant(found.window_s, 2)
     );
@@ -42,7 +42,7 @@ pub fn section(writer: &mut Writer, found: Option<&FreeRun>) {
             table = table.digits(&head, 3, |j| j.given.growth.get(k).map(|at| at.rms));
         }
         table = table
-            .percent("of the way", |j| j.given.relative)
+            .percent("share of travel", |j| j.given.relative)
             .words("unit", |j| j.unit);
     }
     writer.table(table);

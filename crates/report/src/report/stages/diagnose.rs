@@ -382,8 +382,9 @@ pub(super) fn errors(page: &mut Writer, setup: &RobotSetup, found: &Diagnosed) {
             let rms = number::significant(counted.joints[j].rmse, 3);
             format!("{rms} {}", setup.file.torque_unit(j))
         })
-        .percent("residual with a pattern, of torque power", |j| {
-            d.left.unexplained[j].share
-        });
+        .percent(
+            "structured residual, share of the torque's mean square",
+            |j| d.left.unexplained[j].share,
+        );
     page.table(columns);
 }

@@ -255,9 +255,9 @@ fn most_is_left(setup: &RobotSetup, d: &Diagnosis) -> Option<String> {
     let worst = worst(d)?;
     let error = number::percent(errors(&d.after).1.joints[worst].headline());
     let place = match names.len() {
-        1 => format!("a residual with a pattern ({error} of the torque)"),
+        1 => format!("a structured residual ({error} of the torque)"),
         _ => format!(
-            "most at {} (error {error}), a residual with a pattern",
+            "most at {} (error {error}), a structured residual",
             names[worst]
         ),
     };

@@ -122,7 +122,7 @@ fn errors(found: &DriveResult) -> Table {
         }
     }
     let milli = |x: f64| number::significant(1e3 * x, 3);
-    let caption = "mean size of the error of rolled-out positions [mrad]";
+    let caption = "mean position error in simulation [mrad]";
     Columns::new(caption, &rows)
         .words("logs", |row| row.0)
         .numbers("without effects", |row| milli(row.1.mae))

@@ -172,7 +172,7 @@ fn parameters(of: &ToolResult) -> Table {
         columns.push(("with the touched rows", CellAlignment::Left));
     }
     let mut table = Table::new(&columns).caption(&format!(
-        "along the sensor's axes, from its origin; intervals by {} blocks of neighbours",
+        "along the sensor's axes, from its origin; intervals by {} groups of adjacent samples",
         of.blocks
     ));
     for (k, p) in of.parameters.iter().enumerate() {
@@ -271,8 +271,8 @@ fn course(of: &ToolResult) -> CourseFigure {
         changes: Vec::new(),
     };
     CourseFigure {
-        title: "left of each force: spots by bias and weight alone, line with the effects"
-            .to_owned(),
+        title: "force error, before and after the correction".to_owned(),
+        key: ["by bias and weight alone", "with the effects"],
         time_unit: if of.has_clock { "s" } else { "" }.to_owned(),
         panels: [(0, "fx"), (1, "fy"), (2, "fz")]
             .map(|(k, name)| panel(k, name))

@@ -223,6 +223,7 @@ fn course(page: &mut Writer, robot: &TrackedRobot) {
     };
     let (name, logs) = (escape(&robot.name), robot.logs.len());
     let figure = |what: &str, of: &[&TrackedParameter]| CourseFigure {
+        key: ["estimate of one log", "smoothed, 95 %"],
         title: format!("{what} of {name} over {logs} logs"),
         time_unit: unit.to_owned(),
         panels: of.iter().take(DRAWN).map(|p| panel(p)).collect(),
