@@ -220,7 +220,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let bar = context.progress("drives", None);
     let mut each = Vec::new();
-    for data in data.by_joint() {
+    for data in data.by_joint()? {
         context.check()?;
         each.push(identify(&data, &|what| bar.label(what))?);
     }

@@ -36,12 +36,31 @@ fn range(x: &[f64]) -> [f64; 2] {
     [low, x.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
 }
 
-/// Refuses what no drive can be read from, and adds what a person should know to the log's findings.
+/// Refuses what no drive can be read from, and adds what a person should know to the log's findings. A joint that rests
+/// beside others that move is marked.
 pub fn check(log: &mut DriveLog) -> Result<(), DriveError> {
     let mut findings = Vec::new();
-    for track in &log.joints {
-        findings.extend(one(&log.name, track)?);
+    let mut resting = None;
+    for track in &mut log.joints {
+        match one(&log.name, track) {
+            Err(rests @ (DriveError::CommandAtRest { .. } | DriveError::PositionAtRest { .. })) => {
+                track.rests = true;
+                resting.get_or_insert(rests);
+            }
+            found => findings.extend(found?),
+        }
     }
+    match resting {
+        Some(rests) if log.joints.iter().all(|track| track.rests) => return Err(rests),
+        _ => {}
+    }
+    let still = log.joints.iter().filter(|track| track.rests);
+    findings.extend(still.map(|track| {
+        format!(
+            "{}: stands still, so this log says nothing of its drive",
+            track.joint
+        )
+    }));
     log.findings.extend(findings);
     Ok(())
 }
@@ -160,5 +179,24 @@ mod tests {
         let mut late = log(|t| 0.9 * sine(t - 0.05), sine);
         check(&mut late).unwrap();
         assert!(late.findings.is_empty(), "{:?}", late.findings);
+    }
+
+    #[test]
+    fn a_joint_that_rests_beside_one_that_moves_is_marked_and_refuses_nothing() {
+        let sine = |t: f64| (2.0 * t).sin();
+        let mut two = log(sine, sine);
+        let still = log(|_| 0.3, |_| 0.3).joints.remove(0);
+        two.joints.push(JointTrack {
+            joint: "wrist".to_owned(),
+            ..still
+        });
+        check(&mut two).unwrap();
+        let rests: Vec<bool> = two.joints.iter().map(|track| track.rests).collect();
+        assert_eq!(rests, [false, true]);
+        assert!(
+            two.findings
+                .iter()
+                .any(|f| f.starts_with("wrist: stands still"))
+        );
     }
 }

@@ -173,6 +173,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
     problem = problem.by_steps(FINE_STEP);
     let held_out: Vec<&DriveLog> = data.held_out.iter().collect();
     confirm_held_out(&problem, &mut found, &held_out);
+    found.take_sizes();
     shrink(&mut problem, &mut found);
     let bare = DriveProblem {
         frame: UnknownFrame {
@@ -182,6 +183,8 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
         ..problem.clone()
     };
     doing("held-out data");
+    leave_no_harm((&mut problem, &bare), &mut found, &held_out);
+    found.take_sizes();
     let before = errors(&bare, &found.given, &held_out);
     let after = errors(&problem, &found.refined, &held_out);
     let others = other_laws(&problem, &mut found);
@@ -215,15 +218,35 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
 }
 
 impl DriveData {
-    /// The same joint by joint, where no links couple several.
-    pub fn by_joint(&self) -> Vec<DriveData> {
+    /// The same joint by joint, where no links couple several; logs in which a joint rests are none of its own.
+    ///
+    /// # Errors
+    /// A joint that rests in every log that is fitted.
+    pub fn by_joint(&self) -> Result<Vec<DriveData>, DriveError> {
         let joints = self.fitted.first().map_or(0, |log| log.joints.len());
         if self.links.is_some() || joints < 2 {
-            return vec![self.clone()];
+            return Ok(vec![self.clone()]);
+        }
+        for track in &self.fitted[0].joints {
+            let own = |log: &DriveLog| {
+                log.joints
+                    .iter()
+                    .any(|t| t.joint == track.joint && !t.rests)
+            };
+            if !self.fitted.iter().any(own) {
+                return Err(DriveError::Request {
+                    what: format!(
+                        "joint {}: command or position never moves in the logs that are fitted",
+                        track.joint
+                    ),
+                    remedy: "check the columns of this joint, give a log in which it moves, or leave it out"
+                        .to_owned(),
+                });
+            }
         }
         let only = |logs: &[DriveLog], j: usize| {
             let one = |log: &DriveLog| {
-                let track = log.joints.get(j)?.clone();
+                let track = log.joints.get(j).filter(|track| !track.rests)?.clone();
                 Some(DriveLog {
                     joints: vec![track],
                     ..log.clone()
@@ -237,7 +260,7 @@ impl DriveData {
             links: None,
             kind: self.kind,
         };
-        (0..joints).map(of).collect()
+        Ok((0..joints).map(of).collect())
     }
 }
 
@@ -246,9 +269,22 @@ pub fn joined_courses(each: &[IdentifiedDrives]) -> Vec<PositionCourse> {
     let Some((first, rest)) = each.split_first() else {
         return Vec::new();
     };
-    let mut out = first.courses.clone();
+    // a log in which one of the joints rests has no course of it
+    let in_all = |course: &PositionCourse| {
+        let has = |of: &IdentifiedDrives| of.courses.iter().any(|c| c.log == course.log);
+        rest.iter().all(has)
+    };
+    let mut out: Vec<PositionCourse> = first
+        .courses
+        .iter()
+        .filter(|c| in_all(c))
+        .cloned()
+        .collect();
     for other in rest {
-        for (course, more) in out.iter_mut().zip(&other.courses) {
+        for course in &mut out {
+            let Some(more) = other.courses.iter().find(|c| c.log == course.log) else {
+                continue;
+            };
             course.command.extend(more.command.iter().cloned());
             course.measured.extend(more.measured.iter().cloned());
             course.given.extend(more.given.iter().cloned());
@@ -442,6 +478,40 @@ fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
     for (effect, held) in smaller {
         problem.frame.held.extend(held);
         found.refined = estimate::without(problem, &found.refined, effect);
+    }
+}
+
+/// What is written is no worse on held-out logs than the law without effects: while it is, the least sure effect leaves.
+fn leave_no_harm(
+    (problem, bare): (&mut DriveProblem, &DriveProblem),
+    found: &mut FoundDrive,
+    held_out: &[&DriveLog],
+) {
+    if held_out.is_empty() {
+        return;
+    }
+    let errors = |problem: &DriveProblem, law: &LawEstimate| {
+        let unseen = unseen(problem, law, held_out);
+        [Some(errors_on(problem, law, held_out)), unseen].map(|errors| errors.map(|e| e.mae(None)))
+    };
+    let without = errors(bare, &found.given);
+    loop {
+        let with = errors(problem, &found.refined);
+        let mut pairs = with.iter().zip(&without);
+        if !pairs.any(|(with, without)| with > without) {
+            return;
+        }
+        let written = found.steps.iter_mut().filter(|step| step.written());
+        let least = written.min_by(|a, b| a.judged.shrinkage.total_cmp(&b.judged.shrinkage));
+        let Some(step) = least else {
+            // it is the refit of the declared numbers
+            found.refined = found.given.clone();
+            return;
+        };
+        step.status = StepCertainty::HeldOutWorse;
+        let gone = step.unknowns.clone();
+        (problem.frame.held).retain(|(unknown, _)| !gone.contains(unknown));
+        found.refined = estimate::without(problem, &found.refined, step.effect);
     }
 }
 

@@ -128,6 +128,12 @@ impl FurthestOther {
 }
 
 impl IdentifiedDrives {
+    /// How far a number is from what another law says that is as likely.
+    pub(super) fn shift_by_others(&self, unknown: DriveUnknown) -> f64 {
+        self.furthest_other(unknown)
+            .map_or(0.0, |other| other.shift)
+    }
+
     /// Of a number of the law that is written; none where there is no other law.
     fn furthest_other(&self, unknown: DriveUnknown) -> Option<FurthestOther> {
         // a law without the number has none of it

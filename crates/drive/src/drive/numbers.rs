@@ -227,21 +227,28 @@ pub(super) fn step(of: &IdentifiedDrives, volts: bool, step: &Step) -> DriveStep
         shown.unit
     };
     let one = step.unknowns.len() == 1;
+    let written = step.written();
     let parameters = step.unknowns.iter().zip(&step.values).zip(&step.stds);
     let parameters = parameters.filter_map(|((unknown, value), std)| {
         let name = match (one, unknown.joint) {
             (false, Some(j)) => of.joints[j].clone(),
             _ => shown.name.to_owned(),
         };
+        // as the parameter of the same name has it
+        let shift = if written {
+            of.shift_by_others(*unknown)
+        } else {
+            0.0
+        };
+        let std = std.map(|std| std.hypot(shift));
         let (value, std) = match inverse(unknown.quantity) {
             true if *value <= 0.0 => return None,
             true => (1.0 / value, std.map(|std| std / (value * value))),
-            false => (*value, *std),
+            false => (*value, std),
         };
         let unit = unit.to_owned();
         Some((name, StepAmplitude { value, std, unit }))
     });
-    let written = step.written();
     let reason = match step.status {
         StepCertainty::HeldOutWorse => Some("held-out logs get worse by it".to_owned()),
         StepCertainty::Seen if step.judged.floor.is_infinite() => Some(format!(

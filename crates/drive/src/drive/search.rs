@@ -43,6 +43,21 @@ pub struct Step {
     pub alternatives: Vec<DriveEffect>,
 }
 
+impl FoundDrive {
+    /// Gives effects that stand the sizes of the fit in which they stand: others may have left since they joined.
+    pub fn take_sizes(&mut self) {
+        let refined = &self.refined;
+        for step in self.steps.iter_mut().filter(|step| step.written()) {
+            for (k, unknown) in step.unknowns.iter().enumerate() {
+                if let Some(i) = refined.unknowns.iter().position(|own| own == unknown) {
+                    step.values[k] = refined.values[i];
+                    step.stds[k] = refined.jackknife.std(i);
+                }
+            }
+        }
+    }
+}
+
 impl Step {
     pub fn written(&self) -> bool {
         match self.status {

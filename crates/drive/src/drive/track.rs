@@ -44,6 +44,8 @@ pub struct JointTrack {
     pub kp: f64,
     /// Gain of the speed: likewise, N m s/rad.
     pub kd: f64,
+    /// Command or joint stands still all along: the log says nothing of it.
+    pub rests: bool,
 }
 
 /// What the drive moves.

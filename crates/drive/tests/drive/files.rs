@@ -5,6 +5,8 @@ use std::path::Path;
 
 use cft_ident_drive::drive::drive_file::DriveFile;
 use cft_ident_drive::drive::error::DriveError;
+use cft_ident_drive::drive::identify::DriveData;
+use cft_ident_drive::drive::law::DriveLawKind;
 use cft_ident_drive::drive::read::bam::RigGiven;
 use cft_ident_drive::drive::read::{ReadRequest, read};
 use cft_ident_drive::drive::track::{CommandIs, DriveLoad, DriveLog};
@@ -218,13 +220,25 @@ fn a_folder_of_two_tables_is_a_log() {
         format!("type,timestamp,positions\n{state}"),
     )
     .unwrap();
-    let error = read(&LogSpec::whole(folder.path()), &ReadRequest::default()).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("joint joint_2: the command never moves"),
-        "{error}"
-    );
+    let (log, _) = read(&LogSpec::whole(folder.path()), &ReadRequest::default()).unwrap();
+    // the command of the second joint never moves
+    let rests: Vec<bool> = log.joints.iter().map(|track| track.rests).collect();
+    assert_eq!(rests, [false, true]);
+    let of = |fitted: Vec<DriveLog>| DriveData {
+        fitted,
+        held_out: vec![log.clone()],
+        links: None,
+        kind: DriveLawKind::Torque,
+    };
+    let error = of(vec![log.clone()]).by_joint().err().unwrap();
+    assert!(error.to_string().contains("joint joint_2"), "{error}");
+    let mut moving = log.clone();
+    moving.joints[1].rests = false;
+    let each = of(vec![log.clone(), moving]).by_joint().unwrap();
+    let logs: Vec<[usize; 2]> = (each.iter())
+        .map(|data| [data.fitted.len(), data.held_out.len()])
+        .collect();
+    assert_eq!(logs, [[2, 1], [1, 0]]);
 }
 
 #[test]

@@ -177,6 +177,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
     ];
     let zero = rig.offset.unwrap_or(0.0);
     let track = JointTrack {
+        rests: false,
         joint: rig.motor.unwrap_or_else(|| "servo".to_owned()),
         command: rig.entries.iter().map(|e| e.goal_position - zero).collect(),
         position: rig.entries.iter().map(|e| e.position - zero).collect(),

@@ -171,7 +171,11 @@ fn steps(found: &DriveResult) -> Table {
             .map_or(number::ABSENT.to_owned(), |x| number::significant(x, 2));
         format!("{} of {needed}", number::significant(step.deviations, 2))
     };
+    let names_joints = found.steps.iter().any(|step| step.joint.is_some());
     Columns::new("effects", &found.steps)
+        .when(names_joints, |table| {
+            table.words("joint", |step| step.joint.as_deref().unwrap_or("all"))
+        })
         .words("effect", |step| step.effect.name())
         .words("size", size)
         .words("deviations", needed)
