@@ -200,7 +200,7 @@ impl DesignSpace {
         };
         match walls {
             "" if self.pairs.is_empty() && !self.bare.is_empty() => {
-                parts = vec!["collisions of the robot with itself or around it".to_owned()];
+                parts = vec!["collisions with itself or around it".to_owned()];
             }
             "" => parts.push("collisions with what stands around it".to_owned()),
             walls => parts.push(format!(
@@ -302,7 +302,7 @@ mod tests {
         let bare = ARM.split("[limits]").next().unwrap_or_default();
         assert_eq!(
             shown(bare, false),
-            "NOT CHECKED: collisions of the robot with itself or around it; the path to the first point."
+            "NOT CHECKED: collisions with itself or around it; the path to the first point."
         );
     }
 }
