@@ -1,15 +1,14 @@
 //! Drives from logs: the stage as a function of a dataset and a request.
 
-use std::collections::BTreeSet;
-
 use cft_ident_core::robot::Robot;
 
+use super::blocks::{BlocksAre, pieces};
 use super::candidate::DriveEffect;
 use super::chain::RobotChains;
 use super::error::DriveError;
 use super::estimate::{self, LawEstimate};
-use super::fit::{DriveProblem, LogPiece};
-use super::judge::NUMBERS;
+use super::fit::DriveProblem;
+use super::held_out::{DriveErrorsByUse, confirm_held_out, errors, leave_no_harm};
 use super::law::DriveLawKind;
 use super::roll_out::{COARSE_STEP, FINE_STEP};
 use super::search::{self, FoundDrive, StepCertainty};
@@ -26,57 +25,6 @@ pub struct DriveData {
     /// The robot whose links the drives move, with its base parameters.
     pub links: Option<(Robot, Vec<f64>)>,
     pub kind: DriveLawKind,
-}
-
-/// What the jackknife leaves out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BlocksAre {
-    MotionsAndGains,
-    /// Too few of those: equal times of the logs.
-    Time,
-}
-
-/// Time blocks where motions and gains are too few.
-const TIME_BLOCKS: usize = 24;
-
-/// Errors of predicted positions.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DrivePositionErrors {
-    /// Log by log, joint by joint: mean size and mean square [rad, rad^2].
-    pub logs: Vec<(String, usize, Vec<[f64; 2]>)>,
-}
-
-impl DrivePositionErrors {
-    fn mean(&self, of: impl Fn(&[f64; 2]) -> f64, joint: Option<usize>) -> f64 {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (_, rows, joints) in &self.logs {
-            for (j, error) in joints.iter().enumerate() {
-                if joint.is_none_or(|only| only == j) {
-                    sum += of(error) * *rows as f64;
-                    count += *rows as f64;
-                }
-            }
-        }
-        sum / count
-    }
-
-    /// Mean size over all samples [rad], of all joints or of one.
-    pub fn mae(&self, joint: Option<usize>) -> f64 {
-        self.mean(|e| e[0], joint)
-    }
-
-    pub fn rmse(&self, joint: Option<usize>) -> f64 {
-        self.mean(|e| e[1], joint).sqrt()
-    }
-}
-
-/// Errors of a model on logs by their use.
-#[derive(Debug, Clone)]
-pub struct DriveErrorsByUse {
-    pub train: DrivePositionErrors,
-    pub holdout: Option<DrivePositionErrors>,
-    /// Held-out logs, each by a fit without the logs of its motion.
-    pub unseen: Option<DrivePositionErrors>,
 }
 
 /// What was identified.
@@ -320,149 +268,6 @@ fn same_joints(logs: &[&DriveLog]) -> Result<(), DriveError> {
     Ok(())
 }
 
-/// How logs are cut into blocks.
-fn pieces(logs: &[&DriveLog]) -> (Vec<LogPiece>, usize, BlocksAre) {
-    let names: Vec<_> = logs.iter().map(|log| log.block()).collect();
-    let each: BTreeSet<_> = names.iter().cloned().collect();
-    if each.len() >= NUMBERS.blocks {
-        let whole = logs.iter().enumerate().map(|(l, log)| LogPiece {
-            log: l,
-            from: 0,
-            to: log.t.len(),
-            block: each.iter().position(|name| *name == names[l]).unwrap_or(0),
-        });
-        return (whole.collect(), each.len(), BlocksAre::MotionsAndGains);
-    }
-    let total: usize = logs.iter().map(|log| log.t.len()).sum();
-    let long = total.div_ceil(TIME_BLOCKS);
-    let (mut out, mut block, mut room) = (Vec::new(), 0, long);
-    for (l, log) in logs.iter().enumerate() {
-        let mut from = 0;
-        while from < log.t.len() {
-            let to = (from + room).min(log.t.len());
-            out.push(LogPiece {
-                log: l,
-                from,
-                to,
-                block,
-            });
-            room -= to - from;
-            if room == 0 {
-                (block, room) = (block + 1, long);
-            }
-            from = to;
-        }
-    }
-    let blocks = if room == long { block } else { block + 1 };
-    (out, blocks, BlocksAre::Time)
-}
-
-/// Errors of a solution on logs.
-pub fn errors_on(
-    problem: &DriveProblem,
-    at: &LawEstimate,
-    logs: &[&DriveLog],
-) -> DrivePositionErrors {
-    let on = DriveProblem {
-        logs,
-        pieces: Vec::new(),
-        blocks: 0,
-        ..problem.clone()
-    };
-    let residuals = on.residuals(&at.unknowns, &at.values);
-    let of = |(log, joints): (&&DriveLog, Vec<Vec<f64>>)| {
-        let rows = log.t.len();
-        let sums = joints.iter().map(|r| {
-            let mean = |of: fn(f64) -> f64| r.iter().map(|r| of(*r)).sum::<f64>() / rows as f64;
-            [mean(f64::abs), mean(|r| r * r)]
-        });
-        (log.name.clone(), rows, sums.collect())
-    };
-    DrivePositionErrors {
-        logs: logs.iter().zip(residuals).map(of).collect(),
-    }
-}
-
-fn errors(problem: &DriveProblem, at: &LawEstimate, held_out: &[&DriveLog]) -> DriveErrorsByUse {
-    DriveErrorsByUse {
-        train: errors_on(problem, at, problem.logs),
-        holdout: (!held_out.is_empty()).then(|| errors_on(problem, at, held_out)),
-        unseen: unseen(problem, at, held_out),
-    }
-}
-
-/// Errors on held-out logs, each by a fit without its motion; none where no motion was fitted.
-fn unseen(
-    problem: &DriveProblem,
-    at: &LawEstimate,
-    held_out: &[&DriveLog],
-) -> Option<DrivePositionErrors> {
-    let motions: BTreeSet<&str> = held_out.iter().map(|log| log.motion.as_str()).collect();
-    let mut logs = Vec::new();
-    for motion in motions {
-        let kept: Vec<usize> = (0..problem.logs.len())
-            .filter(|l| problem.logs[*l].motion != motion)
-            .collect();
-        if kept.is_empty() {
-            continue;
-        }
-        let rest: Vec<&DriveLog> = kept.iter().map(|l| problem.logs[*l]).collect();
-        let (pieces, blocks, _) = pieces(&rest);
-        let without = DriveProblem {
-            logs: &rest,
-            pieces,
-            blocks,
-            ..problem.by_steps(COARSE_STEP)
-        };
-        let fitted = match kept.len() == problem.logs.len() {
-            true => at.clone(),
-            false => {
-                let scales = without.scales(&at.unknowns, &at.values);
-                let fitted = without.fit(&at.unknowns, &at.values, &scales, UNSEEN_STEPS);
-                LawEstimate {
-                    values: fitted.values,
-                    ..at.clone()
-                }
-            }
-        };
-        let of: Vec<&DriveLog> = held_out
-            .iter()
-            .filter(|log| log.motion == motion)
-            .copied()
-            .collect();
-        logs.extend(errors_on(problem, &fitted, &of).logs);
-    }
-    (!logs.is_empty()).then_some(DrivePositionErrors { logs })
-}
-
-/// Steps of a fit without a motion, from the fit with it.
-const UNSEEN_STEPS: usize = 8;
-
-/// Steps that make held-out logs worse leave, by the fit to all others or by one that saw no log of their motion.
-fn confirm_held_out(problem: &DriveProblem, found: &mut FoundDrive, held_out: &[&DriveLog]) {
-    if held_out.is_empty() {
-        return;
-    }
-    // what foretells a motion that was fitted at another gain may still fail at one that was not
-    let errors = |law: &LawEstimate| {
-        let unseen = unseen(problem, law, held_out);
-        [Some(errors_on(problem, law, held_out)), unseen].map(|errors| errors.map(|e| e.mae(None)))
-    };
-    let mut with = errors(&found.refined);
-    for at in (0..found.steps.len()).rev() {
-        if !found.steps[at].written() {
-            continue;
-        }
-        let less = estimate::without(problem, &found.refined, found.steps[at].effect);
-        let without = errors(&less);
-        let mut pairs = with.iter().zip(&without);
-        if pairs.any(|(with, without)| with > without) {
-            found.steps[at].status = StepCertainty::HeldOutWorse;
-            (found.refined, with) = (less, without);
-        }
-    }
-}
-
 /// Shapes of friction that are not confirmed are held at s times their estimate, everything else fitted around them.
 fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
     let steps = found.steps.iter().filter(|step| step.written());
@@ -478,40 +283,6 @@ fn shrink(problem: &mut DriveProblem, found: &mut FoundDrive) {
     for (effect, held) in smaller {
         problem.frame.held.extend(held);
         found.refined = estimate::without(problem, &found.refined, effect);
-    }
-}
-
-/// What is written is no worse on held-out logs than the law without effects: while it is, the least sure effect leaves.
-fn leave_no_harm(
-    (problem, bare): (&mut DriveProblem, &DriveProblem),
-    found: &mut FoundDrive,
-    held_out: &[&DriveLog],
-) {
-    if held_out.is_empty() {
-        return;
-    }
-    let errors = |problem: &DriveProblem, law: &LawEstimate| {
-        let unseen = unseen(problem, law, held_out);
-        [Some(errors_on(problem, law, held_out)), unseen].map(|errors| errors.map(|e| e.mae(None)))
-    };
-    let without = errors(bare, &found.given);
-    loop {
-        let with = errors(problem, &found.refined);
-        let mut pairs = with.iter().zip(&without);
-        if !pairs.any(|(with, without)| with > without) {
-            return;
-        }
-        let written = found.steps.iter_mut().filter(|step| step.written());
-        let least = written.min_by(|a, b| a.judged.shrinkage.total_cmp(&b.judged.shrinkage));
-        let Some(step) = least else {
-            // it is the refit of the declared numbers
-            found.refined = found.given.clone();
-            return;
-        };
-        step.status = StepCertainty::HeldOutWorse;
-        let gone = step.unknowns.clone();
-        (problem.frame.held).retain(|(unknown, _)| !gone.contains(unknown));
-        found.refined = estimate::without(problem, &found.refined, step.effect);
     }
 }
 

@@ -2,9 +2,11 @@
 
 use cft_ident_core::number::{plus_minus, significant};
 
+use super::blocks::BlocksAre;
 use super::candidate::DriveEffect;
 use super::estimate::LawEstimate;
-use super::identify::{self, BlocksAre, DriveErrorsByUse, IdentifiedDrives};
+use super::held_out::{DriveErrorsByUse, DrivePositionErrors};
+use super::identify::IdentifiedDrives;
 use super::law::DriveLawKind;
 use super::numbers::{given, in_figures, parameter, part, step};
 use super::outcome::{
@@ -153,7 +155,7 @@ impl IdentifiedDrives {
 }
 
 fn by_use(of: &IdentifiedDrives, errors: &DriveErrorsByUse) -> PositionErrorsByUse {
-    let one = |errors: &identify::DrivePositionErrors| DrivePositionError {
+    let one = |errors: &DrivePositionErrors| DrivePositionError {
         mae: errors.mae(None),
         rmse: errors.rmse(None),
         score: errors.rmse(None).powi(2) * of.joints.len() as f64,

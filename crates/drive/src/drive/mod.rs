@@ -6,10 +6,11 @@
 //!       -> roll-outs                    roll_out  one axis; chain: arms and legs
 //!       -> fitted law                   fit       output error, Gauss-Newton with bounds
 //!       -> LawEstimate                  estimate  with deviations, with one effect more or less
-//!       -> steps, judged                search    candidate effects, jackknife in judge
+//!       -> steps, judged                search    candidate effects, jackknife in judge; held_out: what other logs say
 //!       -> Drives                       outcome   names, units, verdicts; drive_file: TOML
 //! ```
 
+pub mod blocks;
 pub mod candidate;
 pub mod chain;
 pub mod check;
@@ -18,6 +19,7 @@ pub mod error;
 pub mod estimate;
 pub mod export;
 pub mod fit;
+pub mod held_out;
 pub mod identify;
 pub mod judge;
 pub mod law;
