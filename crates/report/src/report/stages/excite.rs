@@ -111,6 +111,11 @@ fn verdict(judged: &MotionJudgement, name: &str) -> DiagnosisWords {
             "limits kept",
             "The motion keeps every limit; its torques are a guess.".to_owned(),
         ),
+        0 if judged.limits.iter().any(|l| l.from_logs && l.used > 1.0) => (
+            "limits kept",
+            "The motion keeps every limit of the robot file, and goes beyond what the logs reached."
+                .to_owned(),
+        ),
         0 => ("limits kept", "The motion keeps every limit.".to_owned()),
         1 => ("not safe", "The motion breaks a limit.".to_owned()),
         n => ("not safe", format!("The motion breaks {n} limits.")),
@@ -200,7 +205,7 @@ fn limits_of_logs(judged: &MotionJudgement) -> Option<String> {
     });
     Some(format!(
         "The robot file gives no limit of {}: what the logs reached counts, marked (logs) in the table. To allow more, write \
-         what the robot can do there; this is `{line}` under `[limits.{}]`.{}",
+         what the robot can do: the nearest is `{line}` under `[limits.{}]`.{}",
         kinds.join(", "),
         nearest.name,
         gain.unwrap_or_default()
