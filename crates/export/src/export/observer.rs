@@ -182,7 +182,7 @@ impl ObserverRecipe {
         out += &language.numbers("EDGES", &[n, edges], limits);
         let std = of().flat_map(|j| padded(&j.std, edges + 1, 0.0));
         out += &language.numbers("STD", &[n, edges + 1], std);
-        out += &language.numbers("COULOMB", &[n], of().map(|j| j.coulomb));
+        out += &language.numbers("STANDSTILL", &[n], of().map(|j| j.standstill));
         out += &language.numbers("BAND", &[n], of().map(|j| j.band));
         out += &language.numbers("LIMIT", &[n], of().map(|j| j.limit));
         if let Some(late) = &self.late {

@@ -35,8 +35,9 @@ pub struct UntouchedTorques {
     pub band: f64,
     /// The threshold of alarms, in deviations.
     pub limit: f64,
-    /// Friction near a standstill is any torque up to this [N or Nm]; 0 of a law that does not jump there.
-    pub coulomb: f64,
+    /// Deviation of its friction at a standstill, where it is any torque up to its Coulomb level [N or Nm]; 0 of a law
+    /// that does not jump there.
+    pub standstill: f64,
 }
 
 /// Parameters whose torque is one deviation of the model's.

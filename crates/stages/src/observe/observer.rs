@@ -37,8 +37,9 @@ pub struct ExternalTorques<'a> {
 /// How far friction may be from its law near a standstill: there it is any torque up to its Coulomb level.
 #[derive(Debug, Clone)]
 pub(super) struct StandstillDoubt {
-    /// Coulomb level of each joint whose law jumps at rest [N or Nm]; 0 of others.
-    pub levels: Vec<f64>,
+    /// Deviation of a torque that is anything up to the Coulomb level, of each joint whose law jumps at rest [N or Nm]; 0
+    /// of others.
+    pub deviations: Vec<f64>,
     /// Response of the position filter, within which the speed near a standstill is not known \[s\].
     pub reach_s: f64,
 }
@@ -48,17 +49,18 @@ impl StandstillDoubt {
     pub fn of(model: &AugmentedModel, settings: &FilterSettings, step_s: f64) -> Self {
         let level = |law: &JointFriction| law.coulomb().filter(|_| law.jumps());
         let laws = model.model.friction.iter();
+        let deviation = |law: &JointFriction| level(law).unwrap_or(0.0).abs() / 3f64.sqrt();
         StandstillDoubt {
-            levels: laws.map(|law| level(law).unwrap_or(0.0).abs()).collect(),
+            deviations: laws.map(deviation).collect(),
             reach_s: 1.0 / settings.plain_q_cutoff_hz(1.0 / step_s),
         }
     }
 
-    /// All of the level where joint `j` stands, and none of it from so far on that it stood or will stand beyond the
+    /// All of it where joint `j` stands, and none of it from so far on that it stood or will stand beyond the
     /// filter's response [N or Nm].
     fn at(&self, j: usize, v: f64, a: f64) -> f64 {
         let within = self.reach_s * a.abs() + f64::MIN_POSITIVE;
-        self.levels[j] * (1.0 - v.abs() / within).max(0.0)
+        self.deviations[j] * (1.0 - v.abs() / within).max(0.0)
     }
 }
 
@@ -405,7 +407,7 @@ mod tests {
         for (t, external, variance) in found {
             most = most.max(external.abs());
             // beside the doubt, what the filter rings after it: a few percent
-            let most = 0.06 + 2.0 * variance.sqrt();
+            let most = 0.06 + 2.0 * 3f64.sqrt() * variance.sqrt();
             assert!(external.abs() < most, "{t} {external}");
             let since = (t - delay - 0.5).rem_euclid(1.0);
             if (0.3..0.7).contains(&since) {

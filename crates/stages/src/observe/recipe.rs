@@ -44,8 +44,8 @@ pub fn recipe(
     let lead = late.as_ref().map_or(0, |late| late.lead);
     let threshold = excesses.threshold(per_hour);
     let doubt = StandstillDoubt::of(model, settings, step_s);
-    let untouched = |(held, coulomb): (&HeldOut, &f64)| UntouchedTorques {
-        coulomb: *coulomb,
+    let untouched = |(held, standstill): (&HeldOut, &f64)| UntouchedTorques {
+        standstill: *standstill,
         speed_edges: held.speed_edges.clone(),
         std: held.external_std.clone(),
         band: held.external_99,
@@ -76,7 +76,7 @@ pub fn recipe(
             size: late.size,
             by: late.by,
         }),
-        joints: held.iter().zip(&doubt.levels).map(untouched).collect(),
+        joints: held.iter().zip(&doubt.deviations).map(untouched).collect(),
         reach_s: doubt.reach_s,
         uncertain: uncertain.collect(),
     })
