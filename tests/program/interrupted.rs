@@ -126,8 +126,9 @@ fn a_design_that_is_interrupted_leaves_the_best_motion_so_far() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let run = tool(path, "excite --harmonics 32 -o best.toml --json out.json");
+    // a first best is there within a second or two, all of them within half a minute
     let begun = Instant::now();
-    interrupt(run, "INT", || begun.elapsed() > Duration::from_secs(2));
+    interrupt(run, "INT", || begun.elapsed() > Duration::from_secs(5));
     assert_eq!(names(path), ["best.toml"]);
     let check = tool(path, "excite --check best.toml").wait();
     assert!(check.unwrap().success());
