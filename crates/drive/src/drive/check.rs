@@ -132,6 +132,7 @@ mod tests {
     fn log(position: impl Fn(f64) -> f64, command: impl Fn(f64) -> f64) -> DriveLog {
         let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
         DriveLog {
+            number: 0,
             name: "a.json".to_owned(),
             motion: "m".to_owned(),
             facts: Vec::new(),

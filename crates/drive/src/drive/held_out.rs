@@ -12,18 +12,28 @@ use super::track::DriveLog;
 /// Errors of predicted positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrivePositionErrors {
-    /// Log by log, joint by joint: mean size and mean square [rad, rad^2].
-    pub logs: Vec<(String, usize, Vec<[f64; 2]>)>,
+    pub logs: Vec<LogErrors>,
+}
+
+/// The same of one log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogErrors {
+    pub name: String,
+    /// As in [`DriveLog::number`].
+    pub number: usize,
+    pub rows: usize,
+    /// Joint by joint: mean size and mean square [rad, rad^2].
+    pub joints: Vec<[f64; 2]>,
 }
 
 impl DrivePositionErrors {
     fn mean(&self, of: impl Fn(&[f64; 2]) -> f64, joint: Option<usize>) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for (_, rows, joints) in &self.logs {
-            for (j, error) in joints.iter().enumerate() {
+        for log in &self.logs {
+            for (j, error) in log.joints.iter().enumerate() {
                 if joint.is_none_or(|only| only == j) {
-                    sum += of(error) * *rows as f64;
-                    count += *rows as f64;
+                    sum += of(error) * log.rows as f64;
+                    count += log.rows as f64;
                 }
             }
         }
@@ -68,7 +78,12 @@ pub fn errors_on(
             let mean = |of: fn(f64) -> f64| r.iter().map(|r| of(*r)).sum::<f64>() / rows as f64;
             [mean(f64::abs), mean(|r| r * r)]
         });
-        (log.name.clone(), rows, sums.collect())
+        LogErrors {
+            name: log.name.clone(),
+            number: log.number,
+            rows,
+            joints: sums.collect(),
+        }
     };
     DrivePositionErrors {
         logs: logs.iter().zip(residuals).map(of).collect(),
@@ -80,11 +95,32 @@ pub(super) fn errors(
     at: &LawEstimate,
     held_out: &[&DriveLog],
 ) -> DriveErrorsByUse {
+    by_use(problem, at, errors_held_out(problem, at, held_out))
+}
+
+fn by_use(
+    problem: &DriveProblem,
+    at: &LawEstimate,
+    [holdout, unseen]: HeldOutErrors,
+) -> DriveErrorsByUse {
     DriveErrorsByUse {
         train: errors_on(problem, at, problem.logs),
-        holdout: (!held_out.is_empty()).then(|| errors_on(problem, at, held_out)),
-        unseen: unseen(problem, at, held_out),
+        holdout,
+        unseen,
     }
+}
+
+/// By the fit to all others, and by one that saw no log of their motion: what foretells a motion that was fitted at another
+/// gain may still fail at one that was not.
+type HeldOutErrors = [Option<DrivePositionErrors>; 2];
+
+fn errors_held_out(
+    problem: &DriveProblem,
+    at: &LawEstimate,
+    held_out: &[&DriveLog],
+) -> HeldOutErrors {
+    let by_all = (!held_out.is_empty()).then(|| errors_on(problem, at, held_out));
+    [by_all, unseen(problem, at, held_out)]
 }
 
 /// Errors on held-out logs, each by a fit without its motion; none where no motion was fitted.
@@ -134,16 +170,14 @@ fn unseen(
 /// Steps of a fit without a motion, from the fit with it.
 const UNSEEN_STEPS: usize = 8;
 
-/// Mean position errors on held-out logs, by the fit to all others and by one that saw no log of their motion: what
-/// foretells a motion that was fitted at another gain may still fail at one that was not.
-fn means(problem: &DriveProblem, law: &LawEstimate, held_out: &[&DriveLog]) -> [Option<f64>; 2] {
-    let unseen = unseen(problem, law, held_out);
-    [Some(errors_on(problem, law, held_out)), unseen].map(|errors| errors.map(|e| e.mae(None)))
-}
-
-fn is_worse(with: [Option<f64>; 2], without: [Option<f64>; 2]) -> bool {
-    let mut pairs = with.iter().zip(&without);
-    pairs.any(|(with, without)| with > without)
+/// Whether the mean errors of one law are above those of another.
+fn is_worse(
+    with: [&Option<DrivePositionErrors>; 2],
+    without: [&Option<DrivePositionErrors>; 2],
+) -> bool {
+    let mean = |errors: &Option<DrivePositionErrors>| errors.as_ref().map(|e| e.mae(None));
+    let mut pairs = with.into_iter().zip(without);
+    pairs.any(|(with, without)| mean(with) > mean(without))
 }
 
 /// Steps that make held-out logs worse leave, by the fit to all others or by one that saw no log of their motion.
@@ -155,7 +189,7 @@ pub(super) fn confirm_held_out(
     if held_out.is_empty() {
         return;
     }
-    let errors = |law: &LawEstimate| means(problem, law, held_out);
+    let errors = |law: &LawEstimate| errors_held_out(problem, law, held_out);
     let mut with = errors(&found.refined);
     for at in (0..found.steps.len()).rev() {
         if !found.steps[at].written() {
@@ -163,7 +197,7 @@ pub(super) fn confirm_held_out(
         }
         let less = estimate::without(problem, &found.refined, found.steps[at].effect);
         let without = errors(&less);
-        if is_worse(with, without) {
+        if is_worse(with.each_ref(), without.each_ref()) {
             found.steps[at].status = StepCertainty::HeldOutWorse;
             (found.refined, with) = (less, without);
         }
@@ -171,22 +205,23 @@ pub(super) fn confirm_held_out(
 }
 
 /// What is written is no worse on held-out logs than the law without effects: while it is, the least sure effect leaves.
+/// Gives its errors.
 pub(super) fn leave_no_harm(
-    (problem, bare): (&mut DriveProblem, &DriveProblem),
+    problem: &mut DriveProblem,
     found: &mut FoundDrive,
-    held_out: &[&DriveLog],
-) {
-    if held_out.is_empty() {
-        return;
-    }
-    let without = means(bare, &found.given, held_out);
-    while is_worse(means(problem, &found.refined, held_out), without) {
+    (held_out, without): (&[&DriveLog], &DriveErrorsByUse),
+) -> DriveErrorsByUse {
+    loop {
+        let with = errors_held_out(problem, &found.refined, held_out);
+        if !is_worse(with.each_ref(), [&without.holdout, &without.unseen]) {
+            return by_use(problem, &found.refined, with);
+        }
         let written = found.steps.iter_mut().filter(|step| step.written());
         let least = written.min_by(|a, b| a.judged.shrinkage.total_cmp(&b.judged.shrinkage));
         let Some(step) = least else {
             // it is the refit of the declared numbers
             found.refined = found.given.clone();
-            return;
+            return errors(problem, &found.refined, held_out);
         };
         step.status = StepCertainty::HeldOutWorse;
         let gone = step.unknowns.clone();

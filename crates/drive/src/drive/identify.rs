@@ -58,6 +58,8 @@ pub struct OtherLaws {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionCourse {
     pub log: String,
+    /// As in [`DriveLog::number`].
+    pub number: usize,
     pub held_out: bool,
     pub t: Vec<f64>,
     pub command: Vec<Vec<f64>>,
@@ -131,10 +133,9 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
         ..problem.clone()
     };
     doing("held-out data");
-    leave_no_harm((&mut problem, &bare), &mut found, &held_out);
-    found.take_sizes();
     let before = errors(&bare, &found.given, &held_out);
-    let after = errors(&problem, &found.refined, &held_out);
+    let after = leave_no_harm(&mut problem, &mut found, (&held_out, &before));
+    found.take_sizes();
     let others = other_laws(&problem, &mut found);
     let drawn = held_out.iter().map(|log| (true, *log));
     let drawn = drawn
@@ -143,6 +144,7 @@ pub fn identify(data: &DriveData, doing: &dyn Fn(&str)) -> Result<IdentifiedDriv
     let courses = drawn
         .map(|(held_out, log)| PositionCourse {
             log: log.name.clone(),
+            number: log.number,
             held_out,
             t: log.t.clone(),
             command: log.joints.iter().map(|j| j.command.clone()).collect(),
@@ -175,40 +177,37 @@ impl DriveData {
         if self.links.is_some() || joints < 2 {
             return Ok(vec![self.clone()]);
         }
-        for track in &self.fitted[0].joints {
-            let own = |log: &DriveLog| {
-                log.joints
-                    .iter()
-                    .any(|t| t.joint == track.joint && !t.rests)
+        let only = |logs: &[DriveLog], j: usize| {
+            let one = |(number, log): (usize, &DriveLog)| {
+                let track = log.joints.get(j).filter(|track| !track.rests)?.clone();
+                Some(DriveLog {
+                    number,
+                    joints: vec![track],
+                    ..log.clone()
+                })
             };
-            if !self.fitted.iter().any(own) {
+            logs.iter().enumerate().filter_map(one).collect()
+        };
+        let of = |j: usize| {
+            let fitted: Vec<DriveLog> = only(&self.fitted, j);
+            if fitted.is_empty() {
                 return Err(DriveError::Request {
                     what: format!(
                         "joint {}: command or position never moves in the logs that are fitted",
-                        track.joint
+                        self.fitted[0].joints[j].joint
                     ),
                     remedy: "check the columns of this joint, give a log in which it moves, or leave it out"
                         .to_owned(),
                 });
             }
-        }
-        let only = |logs: &[DriveLog], j: usize| {
-            let one = |log: &DriveLog| {
-                let track = log.joints.get(j).filter(|track| !track.rests)?.clone();
-                Some(DriveLog {
-                    joints: vec![track],
-                    ..log.clone()
-                })
-            };
-            logs.iter().filter_map(one).collect()
+            Ok(DriveData {
+                fitted,
+                held_out: only(&self.held_out, j),
+                links: None,
+                kind: self.kind,
+            })
         };
-        let of = |j| DriveData {
-            fitted: only(&self.fitted, j),
-            held_out: only(&self.held_out, j),
-            links: None,
-            kind: self.kind,
-        };
-        Ok((0..joints).map(of).collect())
+        (0..joints).map(of).collect()
     }
 }
 
@@ -217,20 +216,17 @@ pub fn joined_courses(each: &[IdentifiedDrives]) -> Vec<PositionCourse> {
     let Some((first, rest)) = each.split_first() else {
         return Vec::new();
     };
+    let same =
+        |a: &PositionCourse, b: &PositionCourse| (a.held_out, a.number) == (b.held_out, b.number);
     // a log in which one of the joints rests has no course of it
-    let in_all = |course: &PositionCourse| {
-        let has = |of: &IdentifiedDrives| of.courses.iter().any(|c| c.log == course.log);
-        rest.iter().all(has)
+    let in_all = |course: &&PositionCourse| {
+        let mut rest = rest.iter();
+        rest.all(|of| of.courses.iter().any(|c| same(c, course)))
     };
-    let mut out: Vec<PositionCourse> = first
-        .courses
-        .iter()
-        .filter(|c| in_all(c))
-        .cloned()
-        .collect();
+    let mut out: Vec<PositionCourse> = first.courses.iter().filter(in_all).cloned().collect();
     for other in rest {
         for course in &mut out {
-            let Some(more) = other.courses.iter().find(|c| c.log == course.log) else {
+            let Some(more) = other.courses.iter().find(|c| same(c, course)) else {
                 continue;
             };
             course.command.extend(more.command.iter().cloned());

@@ -168,9 +168,10 @@ fn by_use(of: &IdentifiedDrives, errors: &DriveErrorsByUse) -> PositionErrorsByU
             })
             .collect(),
         logs: (errors.logs.iter())
-            .map(|(name, _, joints)| LogPositionError {
-                name: name.clone(),
-                mae: joints.iter().map(|e| e[0]).sum::<f64>() / joints.len() as f64,
+            .map(|log| LogPositionError {
+                name: log.name.clone(),
+                number: log.number,
+                mae: log.joints.iter().map(|e| e[0]).sum::<f64>() / log.joints.len() as f64,
             })
             .collect(),
     };
@@ -186,19 +187,18 @@ fn joined_errors(each: Vec<&PositionErrorsByUse>) -> PositionErrorsByUse {
     let joined = |of: Vec<&DrivePositionError>| {
         let first = (*of.first()?).clone();
         let n = of.len() as f64;
-        let logs = first
-            .logs
-            .iter()
-            .enumerate()
-            .map(|(l, log)| LogPositionError {
-                name: log.name.clone(),
-                mae: of
-                    .iter()
-                    .filter_map(|e| e.logs.get(l))
-                    .map(|log| log.mae)
-                    .sum::<f64>()
-                    / n,
-            });
+        // of a log in which a joint rests the others speak
+        let mut by_log: Vec<Vec<&LogPositionError>> = Vec::new();
+        for log in of.iter().flat_map(|errors| &errors.logs) {
+            match by_log.iter_mut().find(|own| own[0].number == log.number) {
+                Some(own) => own.push(log),
+                None => by_log.push(vec![log]),
+            }
+        }
+        let logs = by_log.into_iter().map(|own| LogPositionError {
+            mae: own.iter().map(|log| log.mae).sum::<f64>() / own.len() as f64,
+            ..own[0].clone()
+        });
         Some(DrivePositionError {
             mae: of.iter().map(|e| e.mae).sum::<f64>() / n,
             rmse: (of.iter().map(|e| e.rmse * e.rmse).sum::<f64>() / n).sqrt(),

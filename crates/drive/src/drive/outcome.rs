@@ -107,6 +107,9 @@ pub struct JointPositionError {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LogPositionError {
     pub name: String,
+    /// Its place among the logs of its use.
+    #[serde(skip)]
+    pub number: usize,
     /// Mean size [rad].
     pub mae: f64,
 }

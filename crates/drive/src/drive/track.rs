@@ -5,6 +5,8 @@
 pub struct DriveLog {
     /// File name, for people.
     pub name: String,
+    /// Its place among the logs of its use, by which joints that are identified one by one are joined again.
+    pub number: usize,
     /// What was moved: the trajectory's name. Logs of one motion and one set of gains are one block of the jackknife.
     pub motion: String,
     /// The gains and what else a held-out rule may ask for, by name: `kp`, `kd`, `mass`, `length`, `vin`.

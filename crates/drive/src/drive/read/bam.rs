@@ -190,6 +190,7 @@ pub fn read(name: &str, bytes: &[u8], given: &RigGiven) -> Result<DriveLog, Driv
         kd,
     };
     Ok(DriveLog {
+        number: 0,
         name: name.to_owned(),
         motion,
         facts: facts.into_iter().flatten().collect(),

@@ -182,6 +182,7 @@ fn plain(
         facts.extend(value.map(|value| (fact.to_owned(), value)));
     }
     DriveLog {
+        number: 0,
         name: name.to_owned(),
         motion: name.to_owned(),
         facts,
