@@ -27,7 +27,7 @@ const NUMBERS: BetweenLogNumbers = BetweenLogNumbers {
 /// A log that disagrees with the others, and the joint at which it does so most.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DisagreeingLog {
-    /// As in [`BlockFactor::log`].
+    /// Its place among the logs.
     pub log: usize,
     pub joint: usize,
     /// Relative residual of the joint in this log by the fit of all logs, and by its own.
@@ -36,36 +36,40 @@ pub struct DisagreeingLog {
     pub others: [f64; 2],
 }
 
-/// The log that disagrees most with the others; none where one fit does for all.
+/// The log that disagrees most with the others, of the rows of each in one block; none where one fit does for all.
 ///
 /// # Errors
 /// [`FitError`].
 pub fn disagreeing_log(factors: &BlockFactors) -> Result<Option<DisagreeingLog>, FitError> {
-    let logs = factors.blocks.iter().map(|b| b.log + 1).max().unwrap_or(0);
+    let logs = factors.blocks.len();
     if logs < 2 {
         return Ok(None);
     }
-    let of_log = |log: usize| factors.of_blocks(|b| b.log == log);
-    let parts: Vec<BlockFactors> = (0..logs).map(of_log).collect();
+    let parts: Vec<BlockFactors> = (0..logs)
+        .map(|k| factors.of_blocks(|log| log == k))
+        .collect();
     let all = LogFit::of(factors, None)?;
     let (theta, weights) = (&all.theta, &all.weights);
-    let weighted = |part: &BlockFactors| -> f64 {
-        let squares = part.squares_of_joints(theta);
-        let each = squares.iter().zip(weights);
+    let by_all: Vec<Vec<f64>> = parts
+        .iter()
+        .map(|part| part.squares_of_joints(theta))
+        .collect();
+    let weighted = |log: &usize| -> f64 {
+        let each = by_all[*log].iter().zip(weights);
         each.map(|(square, w)| w * w * square).sum()
     };
     let mut order: Vec<usize> = (0..logs).collect();
-    order.sort_by(|a, b| weighted(&parts[*b]).total_cmp(&weighted(&parts[*a])));
+    order.sort_by(|a, b| weighted(b).total_cmp(&weighted(a)));
     let mut most: Option<(f64, DisagreeingLog)> = None;
     for log in order.into_iter().take(NUMBERS.asked) {
-        let rest = factors.of_blocks(|b| b.log != log);
+        let rest = factors.of_blocks(|other| other != log);
         let sides = [&parts[log], &rest];
         let [own, others] = sides.map(|side| LogFit::of(side, Some(weights)));
         // a log that determines nothing contradicts nobody
         let (Ok(own), Ok(others)) = (own, others) else {
             continue;
         };
-        let together = sides.map(|side| side.squares_of_joints(theta));
+        let together = [by_all[log].clone(), rest.squares_of_joints(theta)];
         let apart = [
             sides[0].squares_of_joints(&own.theta),
             sides[1].squares_of_joints(&others.theta),
@@ -121,9 +125,10 @@ impl LogFit {
 }
 
 impl BlockFactors {
-    /// The same of some of the blocks.
-    fn of_blocks(&self, is_in: impl Fn(&BlockFactor) -> bool) -> BlockFactors {
-        let blocks: Vec<BlockFactor> = self.blocks.iter().filter(|b| is_in(b)).cloned().collect();
+    /// The same of some of the blocks, by their places.
+    fn of_blocks(&self, is_in: impl Fn(usize) -> bool) -> BlockFactors {
+        let own = self.blocks.iter().enumerate().filter(|(k, _)| is_in(*k));
+        let blocks: Vec<BlockFactor> = own.map(|(_, block)| block.clone()).collect();
         let rows: u64 = blocks.iter().map(|b| b.rows).sum();
         let moving = |j: usize| {
             let last = |b: &BlockFactor| b.r[j].column(b.r[j].ncols() - 1).norm_squared();
@@ -180,12 +185,12 @@ mod tests {
             all.merge(log);
             all
         });
-        merged.unwrap()
+        merged.unwrap().in_logs()
     }
 
     #[test]
     fn a_log_of_another_mass_is_named_and_logs_of_one_machine_are_not() {
-        assert_eq!(disagreeing_log(&log(4.0, 0.0)).unwrap(), None);
+        assert_eq!(disagreeing_log(&log(4.0, 0.0).in_logs()).unwrap(), None);
         assert_eq!(disagreeing_log(&together(&[4.0; 4])).unwrap(), None);
         let found = disagreeing_log(&together(&[4.0, 4.0, 4.6, 4.0])).unwrap();
         let found = found.unwrap();

@@ -80,6 +80,15 @@ pub struct FitParts {
 }
 
 impl BlockFactors {
+    /// The same rows in one block a log.
+    pub fn in_logs(&self) -> BlockFactors {
+        let blocks: Vec<&BlockFactor> = self.blocks.iter().collect();
+        BlockFactors {
+            blocks: self.joined(&blocks, 1, &|a, b| a.log == b.log),
+            ..self.without_blocks()
+        }
+    }
+
     /// The same rows in parts that can be left out.
     pub fn in_parts(&self) -> FitParts {
         let logs = self.blocks.last().map_or(1, |block| block.log + 1);

@@ -11,7 +11,6 @@ use crate::input::lsq_rows::{LsqRows, PositionReading};
 use crate::input::robot_setup::RobotSetup;
 use cft_ident_core::inertia::accumulate::BlockFactors;
 use cft_ident_core::inertia::add_processing;
-use cft_ident_core::inertia::between_logs::{DisagreeingLog, disagreeing_log};
 use cft_ident_core::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use cft_ident_core::inertia::departure;
 use cft_ident_core::inertia::encoder::{add_scatter, bias};
@@ -113,15 +112,15 @@ pub struct FitRows {
     pub parts: FitParts,
     /// What their solution lacks to the fit's parameters: a law that they are linear about.
     pub shift: DVector<f64>,
-    /// The log that one fit does not bring together with the others.
-    pub disagreeing: Option<DisagreeingLog>,
+    /// The same in one block a log.
+    pub by_log: BlockFactors,
 }
 
 impl FitRows {
     /// Rows that no law shifts, of so many unknowns.
     fn in_one_block(sums: &BlockFactors, unknowns: usize) -> Self {
         FitRows {
-            disagreeing: disagreeing_log(sums).ok().flatten(),
+            by_log: sums.in_logs(),
             sums: sums.in_one_block(),
             parts: FitParts::default(),
             shift: DVector::zeros(unknowns),

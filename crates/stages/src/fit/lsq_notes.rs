@@ -11,7 +11,8 @@ use crate::input::lsq_rows::LsqRows;
 use crate::input::robot_setup::RobotSetup;
 use crate::input::unknowns::FittedUnknown;
 use crate::note::{FitNote, NumberWithStd, StageNote};
-use cft_ident_core::inertia::between_logs::DisagreeingLog;
+use cft_ident_core::inertia::accumulate::BlockFactors;
+use cft_ident_core::inertia::between_logs::disagreeing_log;
 use cft_ident_core::inertia::instruments::ReferenceSource;
 use cft_ident_core::inertia::solution::ConfoundedUnknowns;
 use cft_ident_core::inertia::solve::Fit;
@@ -47,11 +48,7 @@ pub(crate) fn lsq_notes(
     let failed = judged.not_consistent.then_some(FitNote::NotConsistent);
     let resting = rests(setup, &estimate.basis.sums.resting_shares());
     notes.extend(failed.into_iter().chain(resting).map(StageNote::Fit));
-    notes.extend(disagreement(
-        setup,
-        rows,
-        estimate.basis.disagreeing.as_ref(),
-    ));
+    notes.extend(disagreement(setup, rows, &estimate.basis.by_log));
     notes.extend(doubts_of_friction(problem, judged)?);
     let doubts = confounded(&estimate.fit, &judged.unknowns);
     let doubts = bridged.into_iter().chain(doubts);
@@ -64,12 +61,8 @@ pub(crate) fn lsq_notes(
 }
 
 /// A log that one fit does not bring together with the others.
-fn disagreement(
-    setup: &RobotSetup,
-    rows: &LsqRows,
-    found: Option<&DisagreeingLog>,
-) -> Option<StageNote> {
-    let found = found?;
+fn disagreement(setup: &RobotSetup, rows: &LsqRows, by_log: &BlockFactors) -> Option<StageNote> {
+    let found = disagreeing_log(by_log).ok().flatten()?;
     let names = rows.names_in_order();
     Some(StageNote::Fit(FitNote::Disagrees {
         log: names.get(found.log)?.clone(),

@@ -247,20 +247,24 @@ impl<'a> LsqRows<'a> {
     /// The sums of all logs as one, merged in the order of the logs' checksums: they do not depend on the order in which
     /// logs are given.
     fn merged(&self, sums: Vec<BlockFactors>) -> Option<BlockFactors> {
-        let mut keyed: Vec<_> = self.seen().zip(sums).collect();
-        keyed.sort_by(|(a, _), (b, _)| a.key().cmp(&b.key()));
-        let sums = keyed.into_iter().map(|(_, sums)| sums);
+        let sums = self.in_order(sums).map(|(_, sums)| sums);
         sums.reduce(|mut total, sums| {
             total.merge(sums);
             total
         })
     }
 
+    /// What is of each log, in the order of the logs' checksums.
+    fn in_order<T>(&self, of_logs: Vec<T>) -> impl Iterator<Item = (&SeenLog, T)> {
+        let mut keyed: Vec<(&SeenLog, T)> = self.seen().zip(of_logs).collect();
+        keyed.sort_by(|(a, _), (b, _)| a.key().cmp(&b.key()));
+        keyed.into_iter()
+    }
+
     /// Names of the logs, in the order in which their sums are merged.
     pub(crate) fn names_in_order(&self) -> Vec<String> {
-        let mut seen: Vec<&SeenLog> = self.seen().collect();
-        seen.sort_by_key(|seen| seen.key());
-        let names = seen.iter().map(|seen| {
+        let unit = self.seen().map(|_| ()).collect();
+        let names = self.in_order(unit).map(|(seen, ())| {
             let span = seen.provenance.span.iter();
             let span: String = span.map(|span| format!("@{span}")).collect();
             escape(&seen.provenance.name) + &span
